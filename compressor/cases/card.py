@@ -12,7 +12,6 @@ import hashlib
 import math
 import os
 import re
-from bisect import bisect_right
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
@@ -171,6 +170,8 @@ def _check_pressures(path: str, rows: Sequence[Row], name: str, is_gauge: bool) 
 
 def _mean_revolution(path: str, rows: Sequence[Row], is_gauge: bool) -> Card:
     """Return the mean of the revolutions of samples, on the first one's angles."""
+    import numpy as np  # of cases with a card alone
+
     first, last = rows[0][1], rows[-1][1]
     whole = round((last - first) / 360.0)
     if whole and abs(last - first - 360.0 * whole) <= CLOSING:
@@ -185,36 +186,15 @@ def _mean_revolution(path: str, rows: Sequence[Row], is_gauge: bool) -> Card:
                 f"{path}:{rows[-1][0]}: the card ends {lacking:g} degrees before its revolution "
                 "does: give whole revolutions"
             )
-    own = turns[0]
-    columns = [[pressure for _, pressure in own]]
-    for number in range(1, len(turns)):
-        shifted = [(angle - 360.0 * number, pressure) for angle, pressure in turns[number]]
-        columns.append([_between(angle, shifted) for angle, _ in own])
-    count = len(columns)
-    mean = [math.fsum(each) / count for each in zip(*columns, strict=True)]
-    scatter = 0.0
-    if count > 1:
-        squares = [
-            (one - middle) ** 2
-            for column in columns
-            for one, middle in zip(column, mean, strict=True)
-        ]
-        scatter = math.sqrt(math.fsum(squares) / (count - 1) / len(mean))
-    turned = sorted((angle % 360.0, value) for (angle, _), value in zip(own, mean, strict=True))
-    angles, pressures = zip(*turned, strict=True)
-    if any(after <= before for before, after in pairwise(angles)):
+    own, *others = (np.array(turn).T for turn in turns.values())
+    columns = [own[1], *(np.interp(own[0], at, values, period=360.0) for at, values in others)]
+    mean, count = np.mean(columns, axis=0), len(columns)
+    scatter = math.sqrt(np.var(columns, axis=0, ddof=1).mean()) if count > 1 else 0.0
+    order = np.argsort(own[0] % 360.0)
+    angles = (own[0] % 360.0)[order]
+    if (np.diff(angles) <= 0.0).any():
         raise CardError(f"{path}: an angle stands twice in a revolution")
-    return Card(angles, pressures, count, scatter, is_gauge)
-
-
-def _between(angle: float, turn: Sequence[tuple[float, float]]) -> float:
-    """Return the pressure of a revolution at an angle, straight between its samples."""
-    first, last = turn[0], turn[-1]
-    place = bisect_right(turn, (angle, math.inf))
-    left = turn[place - 1] if place else (last[0] - 360.0, last[1])
-    right = turn[place] if place < len(turn) else (first[0] + 360.0, first[1])
-    share = (angle - left[0]) / (right[0] - left[0])
-    return left[1] + share * (right[1] - left[1])
+    return Card(tuple(angles.tolist()), tuple(mean[order].tolist()), count, scatter, is_gauge)
 
 
 def taken_work(card: Card, end: str, crank_radius: float, rod_length: float) -> float:
