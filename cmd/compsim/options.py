@@ -84,19 +84,13 @@ def check_json_units(as_json: bool, units: "Units | None") -> None:
         raise click.UsageError("--json has all numbers in SI: leave out --units plant")
 
 
-SIGNS = {"comma": ",", "semicolon": ";", "tab": "\t", "blank": " ", "point": "."}
-SEPARATOR = click.Choice(["comma", "semicolon", "tab", "blank"])
-DECIMAL = click.Choice(["comma", "point"])
-RECORD: dict[str, tuple[Any, str | None, str]] = {  # option -> type, metavar, help
+RECORD: dict[str, tuple[Any, str, str]] = {  # option -> type, metavar, help
     "channel": (str, "NAME", "Read the acceleration from this channel, a name or a number from 1."),
     "unit": (str, "UNIT", "Take the acceleration in this unit: m/s2, mm/s2, g, in/s2 or ft/s2."),
     "full_scale": (float, "VALUE", "Scale whole numbers in WAV so that the greatest is this."),
     "rate": (float, "HZ", "Take so many samples a second where a file has no times."),
     "time": (str, "NAME", "Read the times from this channel, a name or a number from 1."),
     "time_unit": (str, "UNIT", "Take the times in this unit, whatever the file says: s, ms or us."),
-    "separator": (SEPARATOR, None, "Split lines of text at this sign; found by default."),
-    "decimal": (DECIMAL, None, "Read numbers of a text with this sign; found by default."),
-    "skip_lines": (NUMBER, "COUNT", "Skip so many lines above a text's header; found by default."),
     "tacho": (str, "NAME", "Read the tacho from this channel, a name or a number from 1."),
     "tacho_deg": (float, "DEG", "Set the crank angle at which the tacho rises; 0 by default."),
     "rpm": (float, "RPM", "Take this steady speed of a record without a tacho."),
@@ -110,7 +104,7 @@ def record(command: Callable[..., int]) -> Callable[..., int]:
     @wraps(command)
     def with_hints(**values: Any) -> int:
         given = {name: values.pop(name) for name in RECORD}
-        hints = {name: SIGNS.get(it, it) for name, it in given.items() if it is not None}
+        hints = {name: it for name, it in given.items() if it is not None}
         if ("rpm" in hints) != ("tdc" in hints):
             raise click.UsageError("--rpm and --tdc belong together")
         return command(hints=hints, **values)

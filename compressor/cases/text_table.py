@@ -1,7 +1,7 @@
 """Tables of numbers in text files, as instruments and spreadsheets write them.
 
-Encoding, separator, decimal sign and the lines above the header are found; a caller may give the
-last three. Records and indicator cards are read by it.
+Encoding, separator, decimal sign and the lines above the header are found. Records and indicator
+cards are read by it.
 """
 
 import codecs
@@ -113,25 +113,18 @@ def parse_number(text: str, decimal: str = ".") -> float | None:
     return float(text) if NUMBER.fullmatch(text) else None
 
 
-def open_text_table(
-    path: str | Path, separator: str = "", decimal: str = "", skip_lines: int | None = None
-) -> TextTable:
-    """Return the table of a text file. Raises TextTableError, and OSError for an unreadable file.
-
-    separator: one of `SEPARATORS`, found where it is ""; decimal: one of `DECIMALS`, likewise;
-    skip_lines: the number of lines above the header, found where it is None.
-    """
+def open_text_table(path: str | Path) -> TextTable:
+    """Return the table of a text file. Raises TextTableError, or OSError."""
     text = decode_text(path, Path(path).read_bytes())
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    marks, signs = [separator] if separator else SEPARATORS, [decimal] if decimal else DECIMALS
     blocks: list[_Block] = []
-    for mark in marks:
+    for mark in SEPARATORS:
         with contextlib.suppress(csv.Error):
             rows = [*_split(lines[:SAMPLED_LINES], mark)]
-            blocks += filter(None, (_find_block(rows, mark, sign, skip_lines) for sign in signs))
+            blocks += filter(None, (_find_block(rows, mark, sign) for sign in DECIMALS))
     if not blocks:
         first = next((line for line in lines if line.strip()), "")
-        tried = ", ".join(SEPARATORS[mark] for mark in marks)
+        tried = ", ".join(SEPARATORS.values())
         raise TextTableError(
             f"{path}: holds no rows of numbers (its first line: {printable(first[:60])!r}; "
             f"separators tried: {tried}; decimal point and comma)"
@@ -195,26 +188,22 @@ class _Block(NamedTuple):
     numeric: tuple[bool, ...]
 
 
-def _find_block(
-    rows: Sequence[Row], separator: str, decimal: str, skip_lines: int | None
-) -> _Block | None:
+def _find_block(rows: Sequence[Row], separator: str, decimal: str) -> _Block | None:
     """Return where the rows of numbers begin; None where there are none.
 
     Rows have a shape: which of their cells are numbers. The shape that holds most numbers is the
     table's. Rows above its first one that have a number in one of its columns belong to it, and are
     damaged; the row of words above is the header.
     """
-    rows = [row for row in rows if row[0] > (skip_lines or 0) and any(map(str.strip, row[1]))]
+    rows = [row for row in rows if any(map(str.strip, row[1]))]
     kinds = [[_kind(cell, decimal) for cell in cells] for _, cells in rows]
-    shapes = Counter("".join(one).rstrip(EMPTY) for one in kinds[skip_lines is not None :])
+    shapes = Counter("".join(one).rstrip(EMPTY) for one in kinds)
     merits = {one: shapes[one] * (one.count(DIGITS) - one.count(WORDS)) for one in shapes}
     shape = max(merits, key=lambda one: merits[one], default="")
     if DIGITS not in shape:
         return None
     first = next(k for k, one in enumerate(kinds) if "".join(one).rstrip(EMPTY) == shape)
-    if skip_lines is not None:
-        first = min(first, 1)
-    while first > 0 and skip_lines is None and _is_damaged(kinds[first - 1], shape):
+    while first > 0 and _is_damaged(kinds[first - 1], shape):
         first -= 1
     columns = itertools.zip_longest(*kinds[first:], fillvalue=EMPTY)
     numeric = [one.count(DIGITS) > one.count(WORDS) for one in columns]

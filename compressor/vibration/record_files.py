@@ -46,7 +46,6 @@ TITLES = {
     **dict.fromkeys(("tacho", "tach", "keyphasor", "keyphaser"), "tacho"),
     **dict.fromkeys(("acceleration", "acc", "accel"), "acceleration"),
 }  # fmt: skip
-LAYOUT = "--separator, --decimal and --skip-lines say otherwise"
 UNEVEN = 0.1  # of a time step, by which a step may differ from the mean one
 PLAIN = "separator comma, decimal point, header in line 1,"  # as our own files are
 OPTIONS = {"time": "time", "acceleration": "channel", "tacho": "tacho"}  # that name a channel
@@ -79,7 +78,7 @@ class RecordFile:
         found = ", ".join(one.name for one in self.channels)
         found = f"only {found}" if found else "no signals"
         left = f"; no signals are {'; '.join(self.unused)}" if self.unused else ""
-        return f"{found}{left}" + (f" ({self.layout}; {LAYOUT})" if self.layout else "")
+        return f"{found}{left}" + (f" ({self.layout})" if self.layout else "")
 
 
 def unit_name(text: str, units: dict[str, float] = UNITS) -> str:
@@ -98,21 +97,15 @@ def named_channel(name: str) -> Channel:
     return Channel(name, kind, unit)
 
 
-def open_record_file(path: Path, **layout: Any) -> RecordFile:
-    """Return what the file of a record has. Raises RecordError where it cannot be read.
-
-    layout: separator, decimal and skip_lines of a file of text, where they are told.
-    """
+def open_record_file(path: Path) -> RecordFile:
+    """Return what the file of a record has. Raises RecordError where it cannot be read."""
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         known = ", ".join(filter(None, READERS))
         raise RecordError(f"{path}: no records of the type {path.suffix} are read, only {known}")
-    if layout and reader is not _open_csv:
-        options = ", ".join(f"--{name.replace('_', '-')}" for name in layout)
-        raise RecordError(f"{path}: is no file of text: leave {options} out")
     try:
         path.open("rb").close()
-        return reader(path, **layout)
+        return reader(path)
     except OSError as error:
         remedy = f"give a CSV file with the columns {HEADER}, or a job's key"
         raise RecordError(f"{path}: cannot be read: {error.strerror or error}; {remedy}") from error
@@ -123,12 +116,9 @@ def open_record_file(path: Path, **layout: Any) -> RecordFile:
         raise RecordError(f"{text}; write it again, whole, or as CSV") from error
 
 
-def _open_csv(path: Path, **layout: Any) -> RecordFile:
+def _open_csv(path: Path) -> RecordFile:
     """Return what a text has: columns by their titles, or by numbers from 1 without a header."""
-    try:
-        table = open_text_table(path, **layout)
-    except CompsimError as error:
-        raise RecordError(f"{error} ({LAYOUT})") from error
+    table = open_text_table(path)
     pairs = list(zip(table.names, table.numeric, strict=True))
     return RecordFile(
         path, [named_channel(name) if is_number else Channel(name) for name, is_number in pairs],
@@ -199,20 +189,11 @@ class RecordHints:
     time: str = ""
     unit: str = ""  # one of `UNITS`, in place of what the file says
     time_unit: str = ""  # one of `TIME_UNITS`
-    separator: str = ""  # of a text, as `open_text_table` has it, and so the next two
-    decimal: str = ""
-    skip_lines: int | None = None
     rate: float | None = None  # Hz, of a file without times
     full_scale: float | None = None  # of whole numbers, in the unit
     tacho_deg: float = 0.0  # crank angle at which the tacho rises
     rpm: float | None = None  # a steady speed, with a time (s) of top dead centre: of no tacho
     tdc: float | None = None
-
-    @property
-    def layout(self) -> dict[str, Any]:
-        """Return what is told of a file of text, by the names of `open_text_table`."""
-        names = ("separator", "decimal", "skip_lines")
-        return {one: getattr(self, one) for one in names if getattr(self, one) not in ("", None)}
 
 
 def read_record(path: str | Path, **known: Any) -> Record:
@@ -227,7 +208,7 @@ def read_record(path: str | Path, **known: Any) -> Record:
     channel, an unknown unit, what is no finite number, unequal steps, few or irregular pulses.
     """
     path, hints = Path(path), RecordHints(**known)
-    file = open_record_file(path, **hints.layout)
+    file = open_record_file(path)
     chosen, scales = _choose_channels(file, hints)
     names = {kind: file.channels[number].name for kind, number in chosen.items()}
     columns = dict(zip(chosen, file.read([*chosen.values()]), strict=True))

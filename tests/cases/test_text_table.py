@@ -15,10 +15,10 @@ POINTS = GERMAN.replace(",", ".")
 def table(tmp_path):
     """Writes a text, and opens it."""
 
-    def open_text(data, **told):
+    def open_text(data):
         path = tmp_path / "x.csv"
         path.write_bytes(data if isinstance(data, bytes) else data.encode())
-        return open_text_table(path, **told)
+        return open_text_table(path)
 
     return open_text
 
@@ -72,15 +72,6 @@ def test_words_beside_the_numbers_stay_words(table):
     found = table("Date;t;a\n2026-01-01 12:00:00;0,5;1,2\n2026-01-01 12:00:00;0,6;1,2\n")
     assert found.numeric == (False, True, True)
     assert found.read_columns([1])[1] == [[0.5, 0.6]]
-
-
-def test_a_caller_may_say_what_is_found_otherwise(table):
-    text = "head;1\n7;8\n0,5;1\n0,25;2\n"
-    assert table(text).header_line == 0  # line 1 looks like a damaged row
-    told = table(text, skip_lines=1, decimal=",", separator=";")
-    assert told.read_columns([0])[1] == [[7.0, 0.5, 0.25]]
-    with pytest.raises(TextTableError, match="separators tried: tab;"):
-        table("a;b\n1;2\n", separator="\t")
 
 
 @pytest.mark.parametrize(
