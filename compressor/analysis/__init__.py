@@ -20,7 +20,6 @@ from compressor.analysis.runs import (
     force_relation,
     ideal_motion,
     label,
-    load_phases,
     paper_cases,
     record_of,
     settled_part,

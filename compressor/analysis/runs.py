@@ -11,7 +11,7 @@ import numpy as np
 
 from compressor.cases import Case, CaseError, with_ideal_joints
 from compressor.metrics import JOINTS
-from compressor.physics import exact_motion, sample_segments, segments
+from compressor.physics import exact_motion
 from compressor.solve import record
 
 if TYPE_CHECKING:
@@ -57,10 +57,6 @@ def cases_of(machine: Case) -> dict[str, Case]:
 
 
 FAULT_LABELS = tuple(label(fault, c) for fault in FAULTS for c in CLEARANCES)
-
-
-ACTIVE = 0.1  # of the ideal peak acceleration: where a machine is said to vibrate
-ACTIVE_DEG = 6.0  # of crank angle, over which its rms is taken
 
 
 def settled_part(run: "xr.Dataset") -> "xr.Dataset":
@@ -119,13 +115,6 @@ def record_of(run: "xr.Dataset") -> np.record:
     return _record(run.attrs["case"])
 
 
-def load_phases(run: "xr.Dataset") -> np.ndarray:
-    """Return the phase at each sample: 0 expansion, 1 suction, 2 compression, 3 discharge."""
-    times = run["time"].values
-    edges, phases = segments(record_of(run), times[-1])
-    return phases[sample_segments(times, edges)]
-
-
 @lru_cache(maxsize=32)
 def _case(text: str) -> Case:
     return Case.from_attribute(text)
@@ -134,18 +123,3 @@ def _case(text: str) -> Case:
 @lru_cache(maxsize=32)
 def _record(text: str) -> np.record:
     return record(_case(text))
-
-
-def active_share(run: "xr.Dataset") -> float:
-    """Return the share of the settled time in which the machine vibrates.
-
-    It vibrates where the rms over `ACTIVE_DEG` of the acceleration's deviation from the ideal
-    motion exceeds `ACTIVE` times the ideal peak acceleration.
-    """
-    settled = settled_part(run)
-    _, _, ideal = ideal_motion(settled)
-    angle = settled["crank_angle"].values
-    width = max(1, round(math.radians(ACTIVE_DEG) / (angle[1] - angle[0])))
-    square = (settled["acceleration"].values - ideal) ** 2
-    rms = np.sqrt(np.convolve(square, np.ones(width) / width, mode="valid"))
-    return float((rms > ACTIVE * np.abs(ideal).max()).mean())

@@ -5,11 +5,10 @@ text that they print.
 """
 
 import base64
-import itertools
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -49,38 +48,12 @@ class TableRow:
     key: str = ""
 
 
-MAX_COLUMNS = 8  # of a table that a sheet of paper holds
-MIN_BESIDE = 3  # columns beside those that say what a row is
-
-
 @dataclass(frozen=True)
 class PageTable:
-    """A table; `head` has a title for each column, and the first `lead` say what a row is."""
+    """A table; `head` has a title for each column."""
 
     head: Sequence[str]
     rows: Sequence[TableRow]
-    lead: int = 1
-
-    @property
-    def blocks(self) -> "list[PageTable]":
-        """Return the table in blocks of columns that a sheet of paper holds.
-
-        They are as wide as each other, and each begins with what a row is.
-        """
-        columns = len(self.head) - self.lead
-        count = math.ceil(columns / max(MIN_BESIDE, MAX_COLUMNS - self.lead)) or 1
-        ends = [self.lead + n * columns // count for n in range(count + 1)]
-        return [
-            PageTable(
-                [*self.head[: self.lead], *self.head[low:high]],
-                [
-                    replace(row, cells=[*row.cells[: self.lead], *row.cells[low:high]])
-                    for row in self.rows
-                ],
-                self.lead,
-            )
-            for low, high in itertools.pairwise(ends)
-        ]
 
 
 def number(value: float) -> str:
@@ -148,7 +121,6 @@ class ShownFigure(NamedTuple):
     name: str
     title: str
     caption: str
-    alt: str
     size: tuple[int, int]
     jobs: Sequence[str]
     files: Mapping[str, bytes]
@@ -161,19 +133,16 @@ def show_figure(drawn: DrawnFigure) -> ShownFigure:
         f"{drawn.name}.csv": as_csv(drawn.figure).encode(),
         f"{drawn.name}.js": script(drawn.name, drawn.figure).encode(),
     }
-    return ShownFigure(
-        drawn.name, drawn.title, drawn.caption, drawn.alt, drawn.size, [*drawn.jobs], files
-    )
+    return ShownFigure(drawn.name, drawn.title, drawn.caption, drawn.size, [*drawn.jobs], files)
 
 
 class SectionContent(NamedTuple):
-    """What `section.html` prints; code: files and commands."""
+    """What `section.html` prints."""
 
     table: PageTable | None = None
     paragraphs: Sequence[str] = ()
     lines: Sequence[str] = ()
     figures: Sequence[DrawnFigure | ShownFigure] = ()
-    code: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

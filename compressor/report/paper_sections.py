@@ -1,7 +1,6 @@
 """The sections of a report about the paper: figures, cases, claims, own machines."""
 
 import math
-import shlex
 import warnings
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +12,6 @@ import xarray as xr
 from compressor.analysis import (
     CLEARANCES,
     FAULTS,
-    LOADS,
     ORDER,
     SPOKEN,
     Claim,
@@ -31,7 +29,7 @@ from compressor.report.figures.sweep_data import measures
 from compressor.report.limits import NO_LIMITS, Limits
 from compressor.report.page import Section, SectionContent, ShownFigure, StudyNote, show_figure
 from compressor.report.study_section import file_name, jobs_table
-from compressor.store import DamagedFile, Folder, Stored, StoredStudy, StoreWarning, label_studies
+from compressor.store import DamagedFile, Stored, StoredStudy, StoreWarning, label_studies
 from compressor.units import Units
 
 
@@ -110,17 +108,6 @@ def why_absent(run: xr.Dataset | None, damaged: bool) -> str:
     return "stored without its time series"
 
 
-def case_files(labels: Collection[str]) -> dict[str, str]:
-    """Return the case files that give some of the paper's cases: the text of each by its name."""
-    files = {f"{name}.yaml": f"load: {load}" for name, load in LOADS.items() if name in labels}
-    for fault in FAULTS:
-        sizes = [f"{c:g}" for c in CLEARANCES if label(fault, c) in labels]
-        if sizes:
-            text = f"joint: {fault}\nclearance_mm: [{', '.join(sizes)}]"
-            files[f"{fault.replace('_', '-')}.yaml"] = text
-    return files
-
-
 PAPER = FIGURES["paper"]
 REVOLUTION_ROUNDING = 1e-6  # revolutions: rounding of a whole one
 UNEQUAL = "whose runs do not settle at one crank angle, with fine samples of a whole revolution"
@@ -177,8 +164,9 @@ CASES = (
     "as contact in an ideal joint."
 )
 TO_GET = (
-    "The case files and the command give what is missing. A case that failed is run again with "
-    "--rerun failed, or as a new job once its settings change."
+    "compsim init paper writes a file that has all cases of the paper, and compsim run paper.yaml "
+    "runs those that are not stored. A case that failed is run again with --rerun failed, or as a "
+    "new job once its settings change."
 )
 
 
@@ -217,7 +205,7 @@ def label_in_words(name: str) -> str:
     return f"{SPOKEN[fault]}, {clearance} mm" if clearance else f"{fault} model, no clearance"
 
 
-def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
+def missing_sections(paper: PaperRuns) -> Iterator[Section]:
     """Yield the figures that could not be drawn, what they lack, and how to get it."""
     lacking = {
         item.title: [name for name in item.needs if name in paper.absent] for item in PAPER.values()
@@ -228,13 +216,9 @@ def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
         for title, names in lacking.items()
         if names
     ]
-    if not figures:
-        return
-    files = case_files(paper.absent)
-    texts = [f"# {name}\n{text}" for name, text in files.items()]
-    command = f"compsim run {' '.join(files)} -r {shlex.quote(str(results))}"
-    content = SectionContent(None, [TO_GET], figures, code=[*texts, command])
-    yield Section("missing", "Figures that could not be drawn", content)
+    if figures:
+        content = SectionContent(None, [TO_GET], figures)
+        yield Section("missing", "Figures that could not be drawn", content)
 
 
 def draw_paper(runs: Mapping[str, xr.Dataset], units: Units, study: str = "") -> list[ShownFigure]:

@@ -117,21 +117,10 @@ def write_report(
         publish(folder, page.encode(errors="backslashreplace"))
         return folder
     for name, content in (library | files).items():
-        publish_changed(folder / name, content)
+        publish(folder / name, content, durable=False)  # the same command makes it again
     publish(folder / "index.html", contents.page({}).encode(errors="backslashreplace"))
     remove_stale(folder, contents)
     return folder / "index.html"
-
-
-def publish_changed(path: Path, content: bytes) -> None:
-    """Write a file unless it has this content already. Raises StoreError.
-
-    A power cut may cost it: the same command makes it again.
-    """
-    with contextlib.suppress(OSError):
-        if path.stat().st_size == len(content) and path.read_bytes() == content:
-            return
-    publish(path, content, durable=False)
 
 
 class ReportContent(NamedTuple):
@@ -188,7 +177,7 @@ def build_report(
         *(one.table for one in drawn),
         *tables,
         assumptions_section(bool(paper.stored)),
-        *(missing_sections(paper, results) if papers else ()),
+        *(missing_sections(paper) if papers else ()),
         provenance_section(studies, results, command),
     ]
     series = {key: text for one in drawn for key, text in job_scripts(stored, one.jobs.jobs, units)}

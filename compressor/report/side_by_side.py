@@ -1,6 +1,5 @@
 """A study's machine without clearance beside its worn jobs, as numbers."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +8,9 @@ import xarray as xr
 from compressor.analysis import healthy_twin
 from compressor.cases import Case, stands_for
 from compressor.digits import is_known
-from compressor.metrics import BARRED, JOINTS
-from compressor.report.answer import FORCE, KNOCK, Points, read_numbers
+from compressor.metrics import BARRED
+from compressor.report.answer import FORCE, Points
+from compressor.report.figures.drawing import thin_places
 from compressor.report.figures.sweep_data import MEASURES, Measure, measures, swept_values
 from compressor.report.page import (
     Cell,
@@ -27,8 +27,6 @@ from compressor.units import Units
 MAX_WORN = 10  # jobs that stand beside the machine without clearance
 CLEARANCES = {"clearance_mm", *stands_for("clearance_mm")}
 MAX_TRIED = 50  # jobs among which the worst with clearance is looked for
-SENSOR = "sensor_peak"
-HEARD = 2.0  # times the sensor peak without clearance: what a plant would look into
 FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its meaning
 
 
@@ -63,14 +61,16 @@ def compare_healthy(
     for place in ranked[:MAX_TRIED].tolist():
         if case := stored.case_at(rows[place]):
             alike = [n for n in differing_in_clearance(data, place) if has_clearance[n]]
-            greatest = {"contact force in a worn joint": place} if force[place] > 0.0 else {}
-            for measure in measures_of(SENSOR, data):
-                peaks = known_values(measure, data)[alike]
-                if np.isfinite(peaks).any():
-                    greatest["sensor peak"] = alike[int(np.nanargmax(peaks))]
-            places = choose_jobs(alike, [place, *greatest.values()])
-            are_all = len(places) == len(alike)
-            return _compare(stored, data, case, places, greatest, are_all, units)
+            some = {place, *(alike[n] for n in thin_places(len(alike), MAX_WORN))}
+            places = [n for n in alike if n in some]
+            words = "this job"
+            if len(alike) > 1:
+                count = "all" if len(places) == len(alike) else f"{len(places)} of {len(alike)}"
+                words = f"{count} jobs that differ in clearances alone, from the least on"
+            if len(alike) > 1 and force[place] > 0.0:
+                at = Points(data)[place]
+                words += f"; the greatest contact force in a worn joint is at {at}"
+            return _compare(data, case, places, words, units)
     return None
 
 
@@ -99,27 +99,12 @@ def differing_in_clearance(data: xr.Dataset, place: int) -> list[int]:
     return sorted(jobs, key=lambda n: [values[n] for values in clearances])
 
 
-def choose_jobs(jobs: Sequence[int], needed: Sequence[int]) -> list[int]:
-    """Return the first, the last and the needed jobs, and others between, MAX_WORN in all."""
-    chosen = {jobs[0], jobs[-1], *needed}
-    rest = [job for job in jobs if job not in chosen]
-    if room := max(0, MAX_WORN - len(chosen)):
-        chosen.update(rest[len(rest) // (2 * room) :: max(1, len(rest) // room)][:room])
-    return [job for job in jobs if job in chosen]
-
-
 def _compare(
-    stored: Stored,
-    data: xr.Dataset,
-    case: Case,
-    places: list[int],
-    greatest: Mapping[str, int],
-    are_all: bool,
-    units: Units,
+    data: xr.Dataset, case: Case, places: list[int], beside: str, units: Units
 ) -> HealthyAndWorn | None:
     """Return the table: a row a metric, a column without clearance and one a job.
 
-    greatest: jobs by what is greatest in them, in words; are_all: no job like these is left out.
+    beside: which jobs these are, in words.
     """
     healthy = healthy_twin(xr.Dataset(attrs=case.attributes()))
     if healthy is None:
@@ -136,41 +121,13 @@ def _compare(
         cells = [Cell(column_title(measure)), Cell(number(sound), "number", sound)]
         cells += [_cell(measure, float(values[n]), float(bars[n]), sound) for n in places]
         rows.append(TableRow(cells))
-    keys = data["key"].values.ravel()
-    heads = [(names[n] or "this job") + describe_health(stored, str(keys[n])) for n in places]
-    beside = "this job"
-    if len(places) > 1:
-        peaks = "".join(f"; the greatest {what} is at {names[n]}" for what, n in greatest.items())
-        beside = (
-            f"all jobs that differ in clearances alone, from the least on{peaks}"
-            if are_all
-            else f"{len(places)} jobs that differ in clearances alone, from the least on: those of "
-            "the least and the greatest clearance"
-            + f" and of the greatest {' and '.join(greatest)}" * bool(greatest)
-            + f", and others between{peaks}; the table of all jobs has the rest"
-        )
+    heads = [names[n] or "this job" for n in places]
     words = (
         "The machine without clearance, by the same model: its joints are ideal, also without oil "
-        "film. A sound bearing has some clearance; jobs that count as healthy are marked so. "
+        "film; a sound bearing has some clearance. "
         f"Beside it {beside}. In parentheses: how many times as much as without clearance."
-        + describe_noise(data, healthy, places)
     )
-    return HealthyAndWorn(words, PageTable(["metric", "without clearance", *heads], rows, 2))
-
-
-def describe_noise(data: xr.Dataset, healthy: xr.Dataset, places: Sequence[int]) -> str:
-    """Return that a sensor hears worn jobs of which none knocks, else ""."""
-    if not {SENSOR, KNOCK} <= {*data} or SENSOR not in healthy:
-        return ""
-    (peak,) = measures_of(SENSOR, data)
-    knocks = [read_numbers(m, data)[0].ravel()[places] for m in measures_of(KNOCK, data)]
-    times = np.fmax.reduce(known_values(peak, data)[places]) / float(peak.of(healthy))
-    if not times >= HEARD or not (np.fmax.reduce(knocks) <= BARRED[KNOCK].limit).all():
-        return ""
-    return (
-        f" No joint knocks, but the sensor's peak is up to {times:.2g} times as high: blows that "
-        "are small beside the force in a joint may still be heard."
-    )
+    return HealthyAndWorn(words, PageTable(["metric", "without clearance", *heads], rows))
 
 
 def _cell(measure: Measure, value: float, bar: float, sound: float) -> Cell:
@@ -181,11 +138,3 @@ def _cell(measure: Measure, value: float, bar: float, sound: float) -> Cell:
         times = value / sound
         text += f" ({times:.2f}×)" if times < 9.995 else f" ({times:.3g}×)"
     return Cell(text, "number", None if np.isnan(value) else value)
-
-
-def describe_health(stored: Stored, key: str) -> str:
-    """Return that a job counts as healthy, by its case's `healthy_clearance_mm`; else ""."""
-    position = stored.position(key)
-    case = None if position is None else stored.case_at(position)
-    is_given = case and any(getattr(case.healthy_clearance_mm, joint) > 0.0 for joint in JOINTS)
-    return " (counts as healthy)" if case and is_given and case.worn_joint == "none" else ""

@@ -179,4 +179,4 @@ def jobs_table(data: xr.Dataset, limits: Limits = NO_LIMITS, units: Units = "usu
         cells.append(Cell(str(key)[:KEY_DIGITS], "code"))
         rows.append(job_row(cells, str(status), str(regime), str(key)))
     head = [*swept, "status", *map(column_title, shown), "job"]
-    return PageTable(head, rows, len(swept))
+    return PageTable(head, rows)

@@ -8,13 +8,10 @@ from compressor.analysis.margins import Shares, least
 from compressor.analysis.runs import (
     CLEARANCES,
     FAULT_LABELS,
-    active_share,
     case_of,
     force_relation,
     ideal_motion,
-    load_phases,
     paper_cases,
-    record_of,
     settled_part,
 )
 
@@ -52,15 +49,6 @@ def test_force_relation_of_a_line(run):
 def test_ideal_motion_is_the_ideal_machine_s(paper_runs):
     _, _, a = ideal_motion(paper_runs["design"])
     assert a == pytest.approx(paper_runs["design"]["acceleration"].values, abs=1e-9)
-
-
-@pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
-def test_active_share_of_a_known_vibration(run, share):
-    _, _, ideal = ideal_motion(run)
-    angle = np.degrees(run["crank_angle"].values) % 360
-    shaking = 100 * np.cos(np.radians(60 * angle)) * (angle < 360 * share)
-    run["acceleration"].values[:] = ideal + shaking
-    assert active_share(run) == pytest.approx(share, abs=0.02)
 
 
 def test_claims_without_runs_are_not_judged():
@@ -174,14 +162,3 @@ def test_margins_of_claims_are_those_of_the_page(paper_runs):
 def test_the_case_of_a_run_is_recovered(paper_runs):
     cases = paper_cases()
     assert case_of(paper_runs["both 0.3"]).physics_key == cases["both 0.3"].physics_key
-
-
-@pytest.mark.parametrize("label", ["typical", "design", "both 0.1"])
-def test_the_load_of_a_run_changes_phase_at_its_corners(paper_runs, label):
-    run = paper_runs[label]
-    degrees = np.degrees(run["crank_angle"].values)[:-1] % 360  # the last sample ends a phase
-    corners = np.degrees(record_of(run).corners)
-    far = (np.abs(degrees[:, None] - np.array([*corners, 360.0])) > 1e-6).all(axis=1)
-    expected = np.searchsorted(corners, degrees, side="right")
-    assert (load_phases(run)[:-1][far] == expected[far]).all()
-    assert load_phases(run)[-1] == 3

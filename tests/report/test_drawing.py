@@ -10,7 +10,7 @@ import pytest
 from conftest import decoded
 
 from compressor.report.figures.contours import contour_lines
-from compressor.report.figures.drawing import as_csv, describe_figure, make_grid, outline_cells
+from compressor.report.figures.drawing import as_csv, make_grid, outline_cells
 from compressor.report.figures.style import LineStyle, fill, mark, palette
 from compressor.report.interactive import MAX_POINTS, extremes, script
 
@@ -151,11 +151,6 @@ def test_a_script_breaks_out_of_nothing():
     assert json.loads(name) == "one"
     (trace,) = json.loads(data)["data"]
     assert trace["name"] == "</script><script>alert(1)</script>"
-
-
-def test_what_is_seen_is_said_in_words(drawing):
-    words = describe_figure(drawing.figure())
-    assert words.startswith("4 panels. whole: sine, cosine; enlarged: sine")
 
 
 def test_outlines_hold_the_cells_that_are_in():

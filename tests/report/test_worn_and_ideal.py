@@ -1,7 +1,6 @@
 """A machine without clearance beside its worn jobs: which jobs stand there, and their numbers."""
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,7 +26,7 @@ def swept(once):
         folder.mkdir(exist_ok=True)
         file = folder / "own.yaml"
         file.write_text(
-            f"joint: big_end\nclearance_mm: {[*CLEARANCES]}\nhealthy_clearance_mm: 0.1\n"
+            f"joint: big_end\nclearance_mm: {[*CLEARANCES]}\n\n"
             "body: true\nsensor: true\nsolve: {duration_rev: 1.5, settle_rev: 0.5, "
             "accuracy: draft, error_bars: false}\n"
         )
@@ -65,64 +64,33 @@ def test_the_column_without_clearance_is_the_closed_form(swept, study):
             )
 
 
-def test_all_jobs_of_a_small_study_stand_there_in_blocks(study):
-    """Five of them did, which the program chose, and on paper the worst ones were cut off."""
+def test_all_jobs_of_a_small_study_stand_there(study):
+    """Five of them did, which the program chose."""
     found = compare_healthy(*study)
     assert shown(found) == sorted(CLEARANCES)
     assert "Beside it all jobs that differ in clearances alone" in found.words
-    blocks = found.table.blocks
-    assert [len(block.head) for block in blocks] == [6, 6]
-    assert [size for block in blocks for size in shown(replace(found, table=block))] == shown(found)
-    for n, row in enumerate(found.table.rows):
-        first, second = (block.rows[n].cells for block in blocks)
-        assert [*first, *second[2:]] == [*row.cells]
-        assert first[:2] == second[:2]
 
 
 @pytest.mark.parametrize("worst", CLEARANCES)
-def test_the_worst_jobs_stand_there_in_the_order_of_clearance(study, worst, monkeypatch):
+def test_the_worst_job_stands_there_in_the_order_of_clearance(study, worst, monkeypatch):
     """Columns stood by rms acceleration, and every third job was taken."""
     monkeypatch.setattr(side_by_side, "MAX_WORN", 5)
     stored, data = study
-    loudest = 0.45 - worst
-    loudest = min(CLEARANCES, key=lambda c: abs(c - loudest))
-    for name, at in (("peak_contact_force", worst), ("sensor_peak", loudest)):
-        factor = np.where(data["clearance_mm"] == at, 1e3, 1.0)
-        data[name] = data[name] * factor.reshape(-1, *[1] * (data[name].ndim - 1))
+    data["peak_contact_force"] *= np.where(data["clearance_mm"] == worst, 1e3, 1.0)[:, None]
     found = compare_healthy(stored, data)
     columns = shown(found)
     assert columns == sorted(columns)
-    assert len(columns) == 5
-    assert {min(CLEARANCES), max(CLEARANCES), worst, loudest} <= {*columns}
+    assert len(columns) in (5, 6)
+    assert {min(CLEARANCES), max(CLEARANCES), worst} <= {*columns}
     assert f"the greatest contact force in a worn joint is at clearance {worst:g} mm" in found.words
-    assert f"the greatest sensor peak is at clearance {loudest:g} mm" in found.words
-    assert "Beside it 5 jobs that" in found.words
-    healthy = [text.endswith("(counts as healthy)") for text in found.table.head[2:]]
-    assert healthy == [size <= 0.1 for size in columns]
-
-
-@pytest.mark.parametrize(("knock", "times", "is_told"), [(0.2, 3, True), (0.3, 3, False),
-                                                         (0.2, 1.5, False),
-                                                         (np.nan, 3, False)])  # fmt: skip
-def test_what_a_sensor_hears_though_nothing_knocks_is_told(study, knock, times, is_told):
-    """The page said that it does not knock, and of its sensor nothing."""
-    stored, data = study
-    sound = compare_healthy(stored, data).table.rows
-    (sound,) = (row.cells[1].value for row in sound if row.cells[0].text.startswith("sensor peak"))
-    data["sensor_peak"] = data["sensor_peak"] * 0 + times * sound
-    data["knock"] = data["knock"] * 0 + knock
-    found = compare_healthy(stored, data).words
-    assert (f"the sensor's peak is up to {times} times as high" in found) == is_told
+    assert f"Beside it {len(columns)} of 8 jobs that" in found.words
 
 
 def test_a_peak_that_is_not_known_makes_no_job_the_worst(study):
     stored, data = study
-    for name in ("peak_contact_force", "sensor_peak"):
-        data[f"{name}_error"] = data[name] * 0.0
-    data["peak_contact_force_error"][{"clearance_mm": slice(None)}] = np.inf
+    data["peak_contact_force_error"] = data["peak_contact_force"] * 0.0 + np.inf
     found = compare_healthy(stored, data)
     assert "contact force" not in found.words
-    assert "sensor peak" in found.words
     assert len(shown(found)) == len(CLEARANCES)
 
 

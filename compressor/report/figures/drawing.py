@@ -210,14 +210,6 @@ class Panel:
             font={"color": color, "size": PIXEL * size},
         )  # fmt: skip
 
-    def point_to(self, x: float, y: float, tail: tuple[float, float], color: str) -> None:
-        """Draw an arrow from its tail to x and y."""
-        ends: dict[str, Any] = {}
-        for way, at, start in zip(WAYS, (x, y), tail, strict=True):
-            ends |= {way: float(self.at(way, at)[0]), f"a{way}": float(self.at(way, start)[0])}
-            ends |= {f"{way}ref": f"{way}{self.suffix}", f"a{way}ref": f"{way}{self.suffix}"}
-        self.figure.add_annotation(**ends, showarrow=True, arrowhead=2, arrowcolor=color)
-
     def rule(self, style: LineStyle, x: float = math.nan, y: float = math.nan) -> None:
         """Draw a straight line across the panel, at x or at y."""
         way, other = WAYS if math.isnan(y) else WAYS[::-1]
@@ -535,15 +527,3 @@ def name_places(values: np.ndarray, axis: Axis, rows: Sequence[str] | None = Non
 def texts(values: np.ndarray) -> list[str]:
     """Return the numbers as text, nan as nothing."""
     return ["" if text == "nan" else text for text in np.char.mod("%.8g", values).tolist()]
-
-
-def describe_figure(figure: go.Figure) -> str:
-    """Return a figure in words: its panels, their axes and curves."""
-    found = []
-    for panel in panels_of(figure):
-        curves = ", ".join(dict.fromkeys(one.name for one in panel.traces if one.name))
-        titles = (one_line(axis.title.text or "") for axis in (panel.y, panel.x))
-        axes = " over ".join(filter(None, titles))
-        found.append(": ".join(filter(None, (one_line(panel.title) or axes, curves))))
-    several = f"{len(found)} panels. " if len(found) > 1 else ""
-    return several + "; ".join(dict.fromkeys(found))

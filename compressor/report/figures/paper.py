@@ -18,7 +18,6 @@ from compressor.analysis import (
     force_relation,
     ideal_motion,
     label,
-    load_phases,
     record_of,
     settled_part,
 )
@@ -42,7 +41,6 @@ from compressor.report.figures.style import (
     BLUE,
     BY_CLEARANCE,
     GOLD,
-    GREY,
     RED,
     LineStyle,
     fill,
@@ -291,7 +289,6 @@ def regress(panel: Panel, run: xr.Dataset, joint: str) -> None:
     panel.write(numbers, at, 0.98, inside="xy", side=side, level="top", size=8.5)
 
 
-PHASES = ("expansion", "suction", "compression", "discharge")
 CLOSED = LineStyle(BLUE, (), 1.8, 2.3)
 PRINTED = LineStyle(GOLD, (), 1.6, 2.2)
 BASE = LineStyle("#707070", (1, 1.2), 1.2, 2.1)
@@ -299,7 +296,7 @@ BASE = LineStyle("#707070", (1, 1.2), 1.2, 2.1)
 
 @paper_figure(3, "The ideal p–V diagram", "typical")
 def draw_pressure_volume(runs: Runs, units: Units = "usual") -> DrawnFigure:
-    """Return figure 3: cylinder pressure over volume, with phases and direction."""
+    """Return figure 3: cylinder pressure over volume."""
     run, gas = settled_part(runs["typical"]), case_of(runs["typical"]).gas
     states = end_states(run)
     end = (gas.compressing_ends or [*states])[0]
@@ -309,13 +306,11 @@ def draw_pressure_volume(runs: Runs, units: Units = "usual") -> DrawnFigure:
     panel.label("x", f"{'displaced' if gas.is_measured else 'gas'} volume V ({{}})", "litres")
     panel.label("y", "pressure p ({}, absolute)", "MPa")
     panel.plot(volume, pressure, CLOSED, "gas in the cylinder")
-    phases = load_phases(run)  # of both ends, those of the head end count one, of the other four
-    name_phases(panel, phases % 4 if end == "head" else phases // 4, volume, pressure)
     panel.span("x", 0, 1.05 * volume.max())
     panel.span("y", 0, 1.15 * pressure.max())
     sentence = (
-        f"Pressure over gas volume in the {end} end of the typical model's cylinder; arrows point "
-        "in the direction of time."
+        f"Pressure over gas volume in the {end} end of the typical model's cylinder; against "
+        "the clock, from the upper left: expansion, suction, compression, discharge."
     )
     numbers, used = [], record_of(run).corners
     if used.any():
@@ -325,24 +320,6 @@ def draw_pressure_volume(runs: Runs, units: Units = "usual") -> DrawnFigure:
             ("off the ideal gas's corners by up to", spell_angles(off)),
         ]
     return DrawnFigure(drawing.figure(), sentence, numbers)
-
-
-def name_phases(panel: Panel, phase: np.ndarray, volume: np.ndarray, pressure: np.ndarray) -> None:
-    """Write each phase's name beside it, with an arrow along its direction."""
-    offsets = {"expansion": (14, 8), "suction": (0, -16), "compression": (10, 8)}
-    for number, name in enumerate(PHASES):
-        here = np.flatnonzero(phase == number)
-        if here.size in (0, phase.size):  # the only one, of a measured card or an unloaded end
-            continue
-        here = here[: np.argmax(np.diff(here, append=np.inf) > 1) + 1]  # its first revolution
-        middle = here[np.argmin(np.abs(volume[here] - volume[here].mean()))]
-        places = [middle + here.size // 14, middle - here.size // 14, middle]
-        (x, tail_x, at), (y, tail_y, beside) = volume[places], pressure[places]
-        panel.point_to(x, y, (tail_x, tail_y), BLUE)
-        side = "left" if name in ("expansion", "compression") else "center"
-        level = "top" if name == "suction" else "bottom"
-        shift = offsets.get(name, (0, 10))
-        panel.write(name, at, beside, shift=shift, side=side, level=level, size=11)
 
 
 @paper_figure(4, "The cam of the spring load", "design")
@@ -368,34 +345,19 @@ def draw_cam(runs: Runs, units: Units = "usual") -> DrawnFigure:
 
 
 def draw_contour(panel: Panel, cam: Cam, angles: np.ndarray) -> None:
-    """Draw the closed cam's pitch curve around its base circle, with rays at every quarter turn."""
+    """Draw the closed cam's pitch curve around its base circle."""
     x, y = cam.contour(angles, cam.base_radius)
     panel.title = "(a) contour of the closed cam"
     panel.scale_alike()
     panel.label("x", "x ({})", "mm")
     panel.label("y", "y ({})", "mm")
     panel.fill(*circle(cam.base_radius * 1e3), fill("#f1f1f1"))
-    turns = np.radians([0, 90, 180, 270])
-    for degrees, rim_x, rim_y in zip((0, 90, 180, 270), *cam.contour(turns, 0.0), strict=True):
-        mark_ray(panel, degrees, math.hypot(rim_x, rim_y) + cam.base_radius)
     rim = cam.base_radius * 1e3 * np.array([np.cos(angles), np.sin(angles)])
     panel.plot(rim[0], rim[1], BASE, f"base circle, {cam.base_radius * 1e3:g} mm")
     panel.plot(x * 1e3, y * 1e3, CLOSED, "roller's path")
     for way, values in zip(WAYS, (x, y), strict=True):
         room = 0.06 * np.ptp(values)
         panel.span(way, 1e3 * (values.min() - room), 1e3 * (values.max() + room))
-
-
-def mark_ray(panel: Panel, degrees: float, radius: float) -> None:
-    """Draw a ray from the cam's centre to its rim (m), with its cam angle beside it."""
-    turn = math.radians(degrees)
-    along = np.array([math.cos(turn), math.sin(turn)])
-    ends = np.array([0.0, 1e3 * radius])
-    panel.plot(along[0] * ends, along[1] * ends, LineStyle(GREY, linewidth=0.8))
-    x, y = (1e3 * radius - 45) * along
-    upright = degrees in (90, 270)
-    shift, side, level = ((5, 0), "left", "middle") if upright else ((0, 4), "center", "bottom")
-    panel.write(f"{degrees:g}°", x, y, shift=shift, side=side, level=level)
 
 
 def draw_follower(panel: Panel, cam: Cam, angles: np.ndarray) -> None:

@@ -30,6 +30,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.ticker import MultipleLocator
+from matplotlib.transforms import Bbox
 
 from compressor.digits import plural
 from compressor.report.figures.drawing import (
@@ -83,10 +84,26 @@ STYLE: Any = {
 def render(figure: go.Figure, kind: str = "png") -> bytes:
     """Return a figure as the bytes of a `png` or `svg` file, without a time stamp."""
     stream, painted = io.BytesIO(), paint(figure)
-    box = painted.get_tightbbox().padded(EDGE)  # "tight" would draw all once more to find it
+    box = whole_box(painted, figure).padded(EDGE)
     metadata = {"Date": None} if kind == "svg" else {}
     painted.savefig(stream, format=kind, bbox_inches=box, metadata=metadata)
     return stream.getvalue()
+
+
+def whole_box(painted: Figure, figure: go.Figure) -> Bbox:
+    """Return the box (inches) of a picture: its size, and what stands beyond it.
+
+    That may be a title, a legend, and the numbers or words of the outermost axes; to measure all
+    takes a fifth of the time of a picture.
+    """
+    outer = [axis for axes, panel in zip(painted.axes, panels_of(figure), strict=False)
+             for axis, at, is_named in ((axes.yaxis, panel.x.domain[0], True),
+                                        (axes.xaxis, panel.y.domain[0], panel.x.ticktext))
+             if is_named and at < 1e-6]  # fmt: skip
+    found = [one.get_tightbbox() for one in (*painted.legends, *painted.texts, *outer)]
+    return Bbox.union([painted.bbox, *filter(None, found)]).transformed(
+        painted.dpi_scale_trans.inverted()
+    )
 
 
 Made = TypeVar("Made")
@@ -192,11 +209,6 @@ def paint_panel(axes: Axes, panel: Panel) -> None:
         is_inside = ["domain" in ref for ref in (note.xref, note.yref)]
         at = [10.0**end if scale.type == "log" and not inside else end for end, scale, inside
               in zip((note.x, note.y), (panel.x, panel.y), is_inside, strict=True)]  # fmt: skip
-        if note.showarrow:
-            arrow = {"arrowstyle": "-|>", "color": note.arrowcolor, "mutation_scale": 22,
-                     "shrinkB": 0}  # fmt: skip
-            axes.annotate("", (at[0], at[1]), (note.ax, note.ay), arrowprops=arrow)
-            continue
         frame, level = ("axes fraction" if inside else "data" for inside in is_inside), note.yanchor
         axes.annotate(
             words(note.text), (at[0], at[1]), (note.xshift / PIXEL, note.yshift / PIXEL),

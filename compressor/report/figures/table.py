@@ -12,7 +12,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
-from compressor.report.figures.drawing import INCH, describe_figure
+from compressor.report.figures.drawing import INCH
 from compressor.report.figures.pictures import DPI
 
 Kind = Literal["paper", "job", "study"]
@@ -45,11 +45,6 @@ class DrawnFigure(NamedTuple):
         """Return width and height of the PNG in pixels."""
         layout = self.figure.layout
         return int(layout.width * DPI / INCH), int(layout.height * DPI / INCH)
-
-    @property
-    def alt(self) -> str:
-        """Return what is drawn in words."""
-        return describe_figure(self.figure)
 
     @property
     def jobs(self) -> Iterator[str]:

@@ -39,25 +39,21 @@ function compare(a, b) {
   return collator.compare(a, b);
 }
 
-// Blocks of a table, each with other columns: rows that stand at one place belong together.
 function sortable(table, rows) {
-  const heads = [...table.tHead.rows[0].cells];
-  heads.forEach((head, column) => {
+  [...table.tHead.rows[0].cells].forEach((head, column) => {
     const button = document.createElement("button");
     button.type = "button";
     button.append(...head.childNodes);
     head.append(button);
     button.addEventListener("click", () => {
       const down = head.getAttribute("aria-sort") === "ascending";
-      each("th[aria-sort]", (other) => other.removeAttribute("aria-sort"),
-        table.closest(".blocks") ?? table);
+      each("th[aria-sort]", (other) => other.removeAttribute("aria-sort"), table);
       head.setAttribute("aria-sort", down ? "descending" : "ascending");
-      const at = (parts) => value(parts.find((row) => table.contains(row)), column);
       rows.sort((one, other) => {
-        const [a, b] = [at(one), at(other)];
+        const [a, b] = [value(one, column), value(other, column)];
         return down && a !== "" && b !== "" ? -compare(a, b) : compare(a, b);
       });
-      rows.flat().forEach((row) => row.parentElement.append(row));
+      table.tBodies[0].append(...rows);
     });
   });
 }
@@ -68,34 +64,16 @@ function filterable(rows, tools) {
   const count = document.createElement("output");
   field.type = "search";
   label.append("Show rows with ", field);
-  const marked = ([row], mark) => row.classList.contains(mark);
-  const marks = ["failed", "chaotic", "missing"].filter((mark) =>
-    rows.some((row) => marked(row, mark)));
-  const boxes = marks.map((mark) => {
-    const box = document.createElement("label");
-    const input = document.createElement("input");
-    input.type = "checkbox";
-    input.value = mark;
-    const found = rows.filter((row) => marked(row, mark)).length;
-    box.append(input, ` ${mark === "missing" ? "not run" : mark} (${found})`);
-    return [box, input];
-  });
-  const update = () => {
+  field.addEventListener("input", () => {
     const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
-    const only = boxes.filter(([, input]) => input.checked).map(([, input]) => input.value);
-    let shown = 0;
     rows.forEach((row) => {
-      const text = row.map((part) => part.textContent).join(" ").toLowerCase();
-      const fits = words.every((word) => text.includes(word)) &&
-        (!only.length || only.some((mark) => marked(row, mark)));
-      row.forEach((part) => { part.hidden = !fits; });
-      shown += fits;
+      const text = row.textContent.toLowerCase();
+      row.hidden = !words.every((word) => text.includes(word));
     });
+    const shown = rows.filter((row) => !row.hidden).length;
     count.textContent = shown === rows.length ? "" : `${shown} of ${rows.length} rows`;
-  };
-  field.addEventListener("input", update);
-  boxes.forEach(([, input]) => input.addEventListener("change", update));
-  tools.append(label, ...boxes.map(([box]) => box), count);
+  });
+  tools.append(label, count);
 }
 
 // The key of a job becomes a button that tells of it.
@@ -112,12 +90,11 @@ function openJobs(table) {
 }
 
 function openTable(frame) {
-  const tables = [...frame.querySelectorAll("table")];
-  const rows = [...tables[0].tBodies[0].rows].map((_, n) =>
-    tables.map((table) => table.tBodies[0].rows[n]));
-  tables.forEach(openJobs);
+  const table = frame.querySelector("table");
+  const rows = [...table.tBodies[0].rows];
+  openJobs(table);
   if (rows.length < 2) return;
-  tables.forEach((table) => sortable(table, rows));
+  sortable(table, rows);
   if (rows.length < 12) return;
   const tools = document.createElement("div");
   tools.className = "tools";
@@ -297,7 +274,6 @@ class Figure {
   // Break a note into lines of the room it has. One that would run out of the figure moves back as
   // far as that takes, or stands before its place.
   fit(note, axis, start, across) {
-    if (note.showarrow !== false) return;
     const [left, right] = axis.domain;
     if (note.name === "title") {
       const room = across * (right - left);
@@ -378,14 +354,9 @@ document.addEventListener("DOMContentLoaded", () => {
   });
   useTheme();
   prefersDark.addEventListener("change", useTheme);
-  each(".blocks, .scroll:not(.blocks *)", openTable);
-  each("dialog button", (button) => button.addEventListener("click", () => {
-    if (button.dataset.copy !== undefined) {
-      navigator.clipboard?.writeText(button.closest("dialog").querySelector("code").textContent);
-    } else {
-      button.closest("dialog").close();
-    }
-  }));
+  each(".scroll", openTable);
+  each("dialog button", (button) =>
+    button.addEventListener("click", () => button.closest("dialog").close()));
   const seen = new IntersectionObserver((entries) => entries.forEach((entry) => {
     if (!entry.isIntersecting) return;
     seen.unobserve(entry.target);
