@@ -30,7 +30,7 @@ KINDS = ("first", "greatest", "least")
     "--scan", type=click.IntRange(3, 1000), default=9, help="Run so many even points first."
 )
 @click.option("--log", is_flag=True, help="Space points evenly in the logarithm.")
-@options.units("that of VALUE, else SI")
+@options.units("si")
 @options.set_keys
 @options.results
 @options.jobs("Run in this many worker processes, as many points in one step of --first.")
@@ -45,12 +45,12 @@ def find(config, over, folder, jobs, units, as_json, quiet, **asked) -> int:
     compsim find worn.yaml --over machine.speed_rpm=200:900 \\
         --greatest peak_acceleration
     compsim find worn.yaml --over clearance_mm=0.08:0.3 \\
-        --first 'peak_contact_force.small_end > 1.5 * base' --units plant
+        --first 'peak_contact_force.small_end > 166 kN' --units plant
 
-    VALUE of --first is in SI, has a unit (166 kN), or is a factor of the metric at LOW
-    (1.5 * base). CONFIG must give one case with the key set. The answer of --first is an interval:
-    the comparison is false at its lower end and true at its upper end. The answer of --greatest and
-    --least is the best point. Each point has a row: yes or no, or how it compares with the best.
+    VALUE of --first is in SI, or has a unit. CONFIG must give one case with the key set. The answer
+    of --first is an interval: the comparison is false at its lower end and true at its upper end.
+    The answer of --greatest and --least is the best point. Each point has a row: yes or no, or how
+    it compares with the best.
     Points that error bars cannot decide, or whose jobs failed, are open, inside the interval. Only
     the first change is narrowed down; the scan misses two changes between two of its points.
     For a chaotic motion the mean of a peak over revolutions counts.
@@ -75,10 +75,10 @@ def find(config, over, folder, jobs, units, as_json, quiet, **asked) -> int:
     if not quiet:
         screen.caution([study])
     with ProgressReporter(quiet, "points") as progress:
-        question, answer = search(question, folder, jobs or cores(), progress)
+        answer = search(question, folder, jobs or cores(), progress)
     if as_json:
         screen.print_json(jsonable_answer(question, answer))
     else:
-        screen.print_lines(list_answer(question, answer, folder, units))
+        screen.print_lines(list_answer(question, answer, folder, units or "si"))
     failed = any(point.failed for point in answer.points)
     return screen.SOME_FAILED if failed else screen.DONE

@@ -24,17 +24,15 @@ from compressor.program import Progress, did_you_mean, no_progress
 from compressor.solve import average_bar
 from compressor.store import Folder, StoreError, read_store
 from compressor.studies.frame import GrowingStudy, KeySpan, StudyError
-from compressor.units import READABLE, Units, read_quantity, split_number, unit_in
+from compressor.units import Units, read_quantity, unit_in
 
 # ---- the question
 
 SIGNS = {">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le}
 COMPARISON = re.compile(r"\s*([\w.]+)\s*(>=|<=|>|<)\s*([^<>=]*[^<>=\s])\s*")
-BESIDE = re.compile(r"(?:(\S+?)\s*\*\s*)?base")  # a limit beside the value at the range's lower end
 NO_COMPARISON = (
     f"is no comparison: write METRIC[.JOINT], one of {' '.join(SIGNS)}, and a number in SI, such "
-    "as 'contact_loss_fraction.small_end > 0.001', a number and its unit, such as 166 kN, or a "
-    "factor, such as 1.5 * base"
+    "as 'contact_loss_fraction.small_end > 0.001', or a number and its unit, such as 166 kN"
 )
 WORDS = {
     "joint": JOINTS, "axis": AXES, "threshold": THRESHOLDS,
@@ -62,18 +60,13 @@ class Goal:
     """A metric's number, by its name and its place, such as peak_contact_force.small_end.
 
     sign, limit: of a comparison, limit in the metric's SI unit; sign is "greatest" or "least" where
-    an extremum is sought. times: the limit is so many times the metric at the range's lower end,
-    nan where it is a number; slack: how far that limit may be off, by that point's error bar.
-    limit_unit: in which the limit was written, "" where it was without a unit.
+    an extremum is sought.
     """
 
     metric: str
     place: tuple[str, ...]
     sign: str
     limit: float = math.nan
-    times: float = math.nan
-    slack: float = 0.0
-    limit_unit: str = ""
 
     @property
     def name(self) -> str:
@@ -84,30 +77,10 @@ class Goal:
         """Return the SI unit, "" for a share or a count."""
         return "" if BARRED[self.metric].unit == "1" else BARRED[self.metric].unit
 
-    def beside(self, base: JobReading) -> "Goal":
-        """Return the goal with its limit, from the reading at the range's lower end.
-
-        Raises StudyError where that says nothing.
-        """
-        if base.reason:
-            raise StudyError(f"base, {self.name} at the range's lower end: {base.reason}")
-        return replace(self, limit=self.times * base.value, slack=abs(self.times) * base.bar)
-
-    def unit_shown(self, units: Units | None) -> tuple[str, float]:
-        """Return the unit in which numbers are shown, and the factor to it from SI.
-
-        units: the choice; None: that of the limit as it was written.
-        """
-        if units is None and self.limit_unit in READABLE:
-            return self.limit_unit, 1.0 / READABLE[self.limit_unit][1]
-        return unit_in(self.unit, units or "si")
-
     def holds(self, reading: JobReading) -> bool | None:
         """Return whether the comparison holds; None where the error bar does not decide."""
-        reach = reading.bar + self.slack
-        ends = {
-            bool(SIGNS[self.sign](reading.value + side * reach, self.limit)) for side in (-1.0, 1.0)
-        }
+        around = (reading.value - reading.bar, reading.value + reading.bar)
+        ends = {bool(SIGNS[self.sign](end, self.limit)) for end in around}
         return ends.pop() if not reading.reason and len(ends) == 1 else None
 
     def read(self, numbers: np.void, regime: str) -> JobReading:
@@ -146,17 +119,14 @@ def comparison(text: str) -> Goal:
     parts = COMPARISON.fullmatch(text)
     if parts is None:
         raise StudyError(f"{text!r} {NO_COMPARISON}")
-    goal, beside = goal_of(parts[1], parts[2]), BESIDE.fullmatch(parts[3])
-    number, unit = (beside[1] or "1", "1") if beside else (parts[3], BARRED[goal.metric].unit)
+    goal = goal_of(parts[1], parts[2])
     try:
-        value = read_quantity(number, unit)
+        limit = read_quantity(parts[3], BARRED[goal.metric].unit)
     except ValueError as error:
         raise StudyError(f"{text!r}: {error}") from error
-    if value is None:
+    if limit is None:
         raise StudyError(f"{text!r} {NO_COMPARISON}")
-    if beside:
-        return replace(goal, times=value)
-    return replace(goal, limit=value, limit_unit=split_number(parts[3])[1])
+    return replace(goal, limit=limit)
 
 
 def goal_of(text: str, sign: str) -> Goal:
@@ -251,7 +221,6 @@ class SearchResult:
     best: of an extremum, the best point; within: the points whose bars reach the best one's.
     blind: points inside the interval that do not decide.
     points: all, by argument; run_now: jobs that were not stored before; study: where they are.
-    base: the reading at the range's lower end, where the goal's limit is so many times it.
     """
 
     kind: str
@@ -263,7 +232,6 @@ class SearchResult:
     points: tuple[Point, ...] = ()
     run_now: int = 0
     study: str = ""
-    base: JobReading | None = None
 
 
 def find_first(
@@ -376,12 +344,11 @@ def bracket_best(known: Iterable[Point], factor: float) -> SearchResult:
 
 def find(
     question: Question, folder: Folder, workers: int = 2, progress: Progress = no_progress
-) -> tuple[Question, SearchResult]:
-    """Return a question with its limit in SI, and its answer, by jobs in a folder's store.
+) -> SearchResult:
+    """Return the answer of a question, by jobs in a folder's store.
 
-    Jobs that it holds are not run again. The study is called after the file and the key. It keeps
-    the points of earlier questions that are of the same case. Raises StudyError, CaseFileError,
-    StoreError and WorkersFailed.
+    Jobs that it holds are not run again. The study is called after the file and the key. Raises
+    StudyError, CaseFileError, StoreError and WorkersFailed.
     """
     question.load_first()
     span = question.span
@@ -389,7 +356,6 @@ def find(
         question.path, [span.key], f"-find-{span.key}", folder, question.overrides,
         workers, progress,
     )  # fmt: skip
-    study.find_earlier((span.low,))
 
     def evaluate(shares: Sequence[float]) -> list[Point]:
         values = [span.value(share) for share in shares]
@@ -412,29 +378,21 @@ def find(
         return found
 
     goal, shares, tolerance = question.goal, question.shares, question.tolerance
-    base = None
-    if not math.isnan(goal.times):
-        base = evaluate(shares)[0].reading
-        goal = goal.beside(base)
     if goal.sign in ("greatest", "least"):
         answer = find_extremum(evaluate, goal.sign == "greatest", shares, tolerance)
     else:
         answer = find_first(evaluate, goal.holds, shares, tolerance, workers)
-    found = replace(answer, run_now=study.run_now, study=study.name, base=base)
-    return replace(question, goal=goal), found
+    return replace(answer, run_now=study.run_now, study=study.name)
 
 
 # ---- as rows ------------------------------------------------------------------------------------
 
 
 def list_answer(
-    question: Question, answer: SearchResult, folder: Folder, units: Units | None
+    question: Question, answer: SearchResult, folder: Folder, units: Units
 ) -> Iterator[str]:
-    """Yield an answer as it is printed: where it lies, and a row for each point.
-
-    Numbers are in the chosen units, or in that of the limit.
-    """
-    goal, (unit, factor) = question.goal, question.goal.unit_shown(units)
+    """Yield an answer as it is printed: where it lies, and a row for each point."""
+    goal, (unit, factor) = question.goal, unit_in(question.goal.unit, units)
     ends = [f"{one.argument:.9g}" if one else "none" for one in (answer.low, answer.high)]
     span, steps = question.span, question.scan - 1
     if span.log:
@@ -446,8 +404,6 @@ def list_answer(
     yield f"{goal.name} {goal.sign}{limit}: {answer.kind}"
     head = {"at": f"{answer.best.argument:.9g}"} if answer.best else {}
     head["between" if is_limit else "worse from"] = " and ".join(ends)
-    if answer.base:
-        head["base"] = f"{read(answer.base, unit, factor)}, times {goal.times:g}"
     head["scan"] = f"{question.scan} points {step}: finer changes may be missed"
     head["jobs"] = f"{len(answer.points)}, {answer.run_now} of them run now, in study "
     head["jobs"] += f"{answer.study} of {folder}"
@@ -455,7 +411,7 @@ def list_answer(
     title = f"{goal.metric} ({unit})" if unit else goal.metric
     rows = [(span.key, title, "", "job")]
     for point in answer.points:
-        text = point.reading.reason or read(point.reading, "", factor)
+        text = point.reading.reason or read(point.reading, factor)
         rows.append((f"{point.argument:.9g}", text, verdict(goal, answer, point), point.key[:8]))
     yield from align_columns(rows, ">")
 
@@ -469,10 +425,10 @@ def verdict(goal: Any, answer: SearchResult, point: Point) -> str:
     return "failed" if point.failed else "open" if holds is None else "yes" if holds else "no"
 
 
-def read(reading: JobReading, unit: str, factor: float) -> str:
-    """Return a job's number with its error bar in a unit."""
+def read(reading: JobReading, factor: float) -> str:
+    """Return a job's number with its error bar; factor: to the unit from SI."""
     bar = factor * reading.bar if reading.barred else math.nan
-    text = f"{by_bar(factor * reading.value, bar, False)} {unit}".rstrip()
+    text = by_bar(factor * reading.value, bar, False)
     text += " (mean over revolutions: chaotic)" if reading.averaged else ""
     return text if reading.barred else f"{text} (no error bar was made)"
 

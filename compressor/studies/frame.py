@@ -30,7 +30,6 @@ from compressor.store import (
     Folder,
     StoredStudy,
     StoreError,
-    find_study,
     job_record,
     read_dataset,
     read_store,
@@ -155,19 +154,6 @@ class GrowingStudy:
         (one,) = load_studies(self.path, overrides=replace_settings(self.overrides, *texts))
         self.name = one.name[: MAX_NAME - len(self.ending)] + self.ending
         return self.name
-
-    def find_earlier(self, point: Point) -> None:
-        """Take up the points of the stored study of this name that are still of this case.
-
-        point: one that makes a case.
-        """
-        self.find_name(point)
-        with contextlib.suppress(StoreError, ValueError):  # no study yet, or no longer its points
-            axes = {axis.key: axis.values for axis in find_study(self.folder, self.name).axes}
-            if [*axes] == [*self.keys]:
-                given, stored = [*zip(*axes.values(), strict=True)], read_store(self.folder).keys()
-                pairs = zip(given, self.load(given).keys, strict=True)
-                self.jobs |= {point: key for point, key in pairs if key in stored}
 
     def run(self, given: Sequence[Point]) -> list[str]:
         """Return the keys of the jobs of points, run where they are missing; "" of refused ones.

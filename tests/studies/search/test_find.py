@@ -38,20 +38,10 @@ def jobs(function, bar=0.0, calls=None):
     return evaluate
 
 
-def test_a_limit_may_have_a_unit_or_be_a_factor():
+def test_a_limit_may_have_a_unit():
     assert comparison("peak_contact_force.small_end > 166 kN").limit == 166e3
     assert comparison("peak_acceleration >= 2 g").limit == pytest.approx(19.6133)
     assert comparison("contact_loss_fraction.big_end < 5 %").limit == 0.05
-    shown = comparison("peak_contact_force.small_end > 166 kN").unit_shown
-    assert [shown(None), shown("si")] == [("kN", pytest.approx(1e-3)), ("N", 1.0)]
-    assert comparison("peak_acceleration > 5").unit_shown(None) == ("m/s2", 1.0)
-    goal = comparison("peak_acceleration > 1.5 * base").beside(JobReading(10.0, 0.2))
-    assert (goal.limit, goal.slack) == (15.0, pytest.approx(0.3))
-    readings = [JobReading(value, 0.2) for value in (14.4, 14.6, 15.4, 15.6)]
-    assert [goal.holds(one) for one in readings] == [False, None, None, True]
-    assert comparison("peak_acceleration > base").times == 1.0
-    with pytest.raises(StudyError, match=r"base, peak_acceleration at .*: the job failed"):
-        goal.beside(FAILED)
 
 
 @pytest.mark.parametrize("threshold", [0.0001, 0.2, 0.3721, 0.5, 0.99])
@@ -230,7 +220,7 @@ def test_a_limit_without_a_bar_is_decided(sign, there):
         ("peak_acceleration == 1", "is no comparison"),
         ("peak_acceleration > nan", "is no comparison"),
         ("1 < peak_acceleration < 2", "is no comparison"),
-        ("peak_acceleration > x * base", "is no comparison"),
+        ("peak_acceleration > 1.5 * base", "'* base' is no unit of it"),
         ("peak_acceleration > 2 kN", "'kN' is no unit of it; there are m/s2, m/s², g"),
     ],
 )
