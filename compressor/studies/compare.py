@@ -33,13 +33,8 @@ MIN_LINES = 8  # of a third octave, by which noise is known
 QUIET = 1e-4  # share of the loudest third octave below which none is compared
 SAME_BAND = 0.5  # dB, to which a third octave of a job is taken as known
 UNSAID = {"joint", "clearance_mm", "sensor"}  # swept groups that are told otherwise, or not
-NEAR = 0.25  # share by which a ratio may differ from one between two units
-MISTAKES = {  # ratio of rms -> what was probably mistaken
-    9.80665: "m/s2 were perhaps read as g", 1 / 9.80665: "g were perhaps read as m/s2",
-    1000.0: "mm/s2 were perhaps read as m/s2", 1e-3: "m/s2 were perhaps read as mm/s2",
-}  # fmt: skip
 MAX_LISTED = 20  # jobs
-MAX_DRAWN = 3  # jobs with a line of their own; the others are in the range alone
+MAX_DRAWN = 3  # jobs
 KEY_DIGITS = 10
 
 
@@ -235,9 +230,8 @@ class Compared:
 class Comparison:
     """A record beside jobs, the most alike first.
 
-    remarks: how a file was read, and which unit it was perhaps written in; orders: the highest that
-    the record holds; left_out: jobs without a record that can be used; around: the least and the
-    greatest envelope of the jobs, (2, 360).
+    remarks: how a file was read; orders: the highest that the record holds; left_out: jobs without
+    a record that can be used.
     """
 
     name: str
@@ -247,18 +241,6 @@ class Comparison:
     orders: int
     jobs: tuple[Compared, ...]
     left_out: int
-    around: np.ndarray
-
-    @property
-    def inside(self) -> float:
-        """Return the share of crank angle at which the record's envelope lies in the jobs' range.
-
-        nan of a single job.
-        """
-        low, high = self.around
-        envelope = self.curves.envelope
-        is_inside = (envelope >= low) & (envelope <= high)
-        return float(is_inside.mean()) if len(self.jobs) > 1 else math.nan
 
 
 def compare_record(
@@ -300,13 +282,9 @@ def compare_record(
         text = f"none of the {len(wanted)} jobs has a sensor's record of two revolutions"
         raise StudyError(f"{text}: run them with body: true, sensor: true and series kept")
     jobs.sort(key=lambda job: np.nan_to_num(job.likeness["difference"].value, nan=math.inf))
-    several = np.array([job.curves.envelope for job in jobs])
-    ratio = jobs[0].likeness["rms_ratio"].value
-    unit = [f"the rms is {ratio:.3g} times the job's: {text}; check --unit"
-            for size, text in MISTAKES.items() if abs(ratio / size - 1.0) <= NEAR]  # fmt: skip
     return Comparison(
-        name, (*record.remarks, *unit), mine, own[mine.highest], mine.highest, tuple(jobs),
-        len(wanted) - len(jobs), np.array([several.min(axis=0), several.max(axis=0)]),
+        name, record.remarks, mine, own[mine.highest], mine.highest, tuple(jobs),
+        len(wanted) - len(jobs),
     )  # fmt: skip
 
 
@@ -354,9 +332,6 @@ def list_comparison(found: Comparison) -> Iterator[str]:
         yield f"and {more} less alike, which --json lists"
     if found.left_out:
         yield f"left out: {plural(found.left_out)} without a sensor's record of two revolutions"
-    if len(found.jobs) > 1:
-        share = f"{found.inside:.0%} of crank angles"
-        yield f"envelope: inside the range of the {len(found.jobs)} jobs at {share}"
 
 
 def format_number(found: Measured) -> str:
@@ -370,7 +345,7 @@ def jsonable_comparison(found: Comparison) -> dict[str, Any]:
     return {
         "record": found.name, "revolutions": len(mine.values), "rpm": mine.rpm,
         "rate_Hz": mine.rate, "orders": found.orders, "left_out": found.left_out,
-        "remarks": found.remarks, "envelope_inside": found.inside,
+        "remarks": found.remarks,
         "jobs": [{name: getattr(job, name) for name in named}
                  | {name: asdict(one) for name, one in job.likeness.items()}
                  for job in found.jobs],
@@ -383,7 +358,7 @@ RECORD = style.LineStyle(style.BLACK, linewidth=1.3, zorder=3.0)
 CAPTION = (
     "The record (black) beside the jobs most alike: (a) mean revolution; (b) peak and, paler, rms "
     "of each 10 degrees, on average over revolutions; (c) rms of the orders; (d) envelope above "
-    f"order {ORDER}, in the range of all jobs."
+    f"order {ORDER}."
 )
 
 
@@ -396,10 +371,6 @@ def draw_comparison(found: Comparison) -> PlotlyFigure:
     )]  # fmt: skip
     (mean, segments), (orders, envelope) = grid
     degrees = np.arange(360) + 0.5
-    if (count := len(found.jobs)) > 1:
-        low, high = found.around
-        edge = np.concatenate([degrees, degrees[::-1]]), np.concatenate([low, high[::-1]])
-        envelope.fill(*edge, style.fill(style.GREY, 0.5), f"range of {count} jobs", listed=False)
     steps = np.repeat(np.arange(SEGMENTS + 1) * (360.0 / SEGMENTS), 2)[1:-1]
     for name, one, line in shown:
         mean.plot(one.angle, one.mean, line, name)

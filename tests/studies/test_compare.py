@@ -8,11 +8,10 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 from conftest import store_cases
-from scipy.io import wavfile
 
 from compressor.studies.compare import CAPTION, curves, measure_likeness
 from compressor.studies.frame import by_revolutions
-from compressor.vibration import Record, read_record, record_columns
+from compressor.vibration import Record
 
 HEARD = {"length_rev": 10, "noise_m_per_s2": 0.05}
 CASE = {
@@ -94,33 +93,12 @@ def test_an_exported_record_is_its_job(folder, compare, export):
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize(
-    ("unit", "told"),
-    [
-        ("g", "read: the rms is 9.81 times the job's: m/s2 were perhaps read as g; check --unit"),
-        ("mm/s2", "read: the rms is 0.001 times the job's: m/s2 were perhaps read as mm/s2; check"),
-    ],
-)
-def test_a_unit_that_was_perhaps_mistaken_is_named(unit, told, folder, compare, export):
-    record, path = read_record(export), folder[0] / "record.wav"
-    tacho = record_columns(record.times, record.values, record.tacho)["tacho"]
-    signals = np.stack([record.values, tacho], axis=1).astype(np.float32)
-    wavfile.write(path, round(1 / record.times[1]), signals)
-    words = ["--channel", "1", "--tacho", "2", "--tacho-deg", "20", "--unit"]
-    assert told in compare(path, folder[1], *words, unit)
-    assert "perhaps" not in compare(path, folder[1], *words, "in/s2")
-    (job,) = json.loads(compare(path, folder[1], *words, "m/s2", "--json"))["jobs"]
-    assert job["rms_ratio"]["value"] == pytest.approx(1.0, rel=0.01)
-
-
-@pytest.mark.compiled
 def test_the_figure_has_the_curves_of_both(folder, compare, tmp_path):
     picture, table = tmp_path / "x.svg", tmp_path / "x.csv"
     out = compare(folder[1], "others", "-o", picture)
     assert ET.parse(picture).getroot().tag.endswith("svg")
     assert out.splitlines()[-1].strip() == CAPTION
-    found = json.loads(compare(folder[1], "others", "-o", table, "--json"))
-    assert f"inside the range of the 6 jobs at {found['envelope_inside']:.0%} of crank" in out
+    compare(folder[1], "others", "-o", table, "--json")
     with open(table, newline="", encoding="utf-8") as file:
         head, *_ = csv.reader(file)
     assert f"(b): {folder[1]}: peak and rms of 10° segments (m/s²)" in head
