@@ -39,11 +39,6 @@ def read_bands(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) ->
     "--false-alarms", type=RATE, default=0.01, help="Set limits for this rate of false alarms."
 )
 @click.option(
-    "--factor",
-    type=click.FloatRange(0.0, min_open=True),
-    help="Set limits at so many times a sound machine's usual reading in place of that.",
-)
-@click.option(
     "--detected", type=RATE, default=0.9, help="Call a clearance detected at this share of windows."
 )
 @click.option(

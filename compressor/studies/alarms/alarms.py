@@ -27,7 +27,7 @@ import xarray as xr
 from compressor.analysis import faulty_joints, interpolate_hours
 from compressor.cases import Case, Sensor, Wear
 from compressor.metrics import JOINTS
-from compressor.program import PROGRAM, Progress, no_progress
+from compressor.program import Progress, no_progress
 from compressor.report import PlotlyFigure, make_grid, style
 from compressor.store import Folder, StoredStudy, find_study, read_dataset
 from compressor.studies.alarms.readings import (
@@ -208,15 +208,14 @@ def list_states(windows: Windows) -> Iterator[tuple[str, np.ndarray]]:
 
 def judge_alarms(
     folder: Folder, study: str, bands: Sequence[Band] = (), noise: Sequence[float] = (0.0,),
-    revolutions: int = 5, false_alarms: float = 0.01, factor: float | None = None,
-    detected: float = 0.9, progress: Progress = no_progress,
+    revolutions: int = 5, false_alarms: float = 0.01, detected: float = 0.9,
+    progress: Progress = no_progress,
 ) -> xr.Dataset:  # fmt: skip
     """Return how often each alarm trips in each state of a stored study, and how often falsely.
 
     bands: of the filters, Hz, none for `default_bands`; noise: rms values (m/s2) of white noise
     that is added to records; revolutions: of a window; false_alarms: the rate that limits are set
-    for; factor: limits in its place, times a sound machine's usual reading; detected: the share of
-    windows from which on an alarm is said to detect.
+    for; detected: the share of windows from which on an alarm is said to detect.
 
     Dimensions: `alarm` (with its filter), `noise`, `state` (a worn joint and a clearance), `joint`,
     `end` (a value and its 95 % interval by draws, for limits as they were set). Variables: `limit`,
@@ -228,13 +227,12 @@ def judge_alarms(
     check_draws(source, windows)
     sound = windows.joints == SOUND
     draws = len({*windows.draws[sound].tolist()})
-    return judge_windows(windows, noise, false_alarms, factor, detected).assign_attrs(
-        title=f"compsim: alarms of {source.name}", program=PROGRAM, study=source.name,
-        case_file=source.case_file, revolutions=revolutions, detected=detected,
-        rate=max(false_alarms, 1.0 / (draws + 1)), wanted=false_alarms, factor=factor or math.nan,
-        sound_draws=draws, sound_jobs=len({*windows.keys[sound].tolist()}),
-        worn_jobs=len({*windows.keys[~sound].tolist()}), clipped=windows.clipped,
-        left_out=json.dumps(+left),
+    return judge_windows(windows, noise, false_alarms, detected).assign_attrs(
+        title=f"compsim: alarms of {source.name}", study=source.name, case_file=source.case_file,
+        revolutions=revolutions, detected=detected, wanted=false_alarms, sound_draws=draws,
+        rate=max(false_alarms, 1.0 / (draws + 1)), clipped=windows.clipped,
+        sound_jobs=len({*windows.keys[sound].tolist()}), left_out=json.dumps(+left),
+        worn_jobs=len({*windows.keys[~sound].tolist()}),
     )  # fmt: skip
 
 
@@ -247,9 +245,8 @@ RATES = {  # name -> dims beside alarm and noise, unit, long name
 
 
 def judge_windows(
-    windows: Windows, noise: Sequence[float], false_alarms: float, factor: float | None,
-    detected: float,
-) -> xr.Dataset:  # fmt: skip
+    windows: Windows, noise: Sequence[float], false_alarms: float, detected: float
+) -> xr.Dataset:
     """Return the `RATES` of all alarms whose reading all sound windows have."""
     sound, draws, readings = windows.joints == SOUND, windows.draws, windows.readings
     states = [*list_states(windows)]
@@ -263,7 +260,7 @@ def judge_windows(
     def trip(alarm: Alarm, own: Readings, setting: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the limit that sound windows set, and which windows are above it."""
         scores = alarm.score(own, setting)
-        limit = factor or find_limit(scores[setting], draws[setting], false_alarms)
+        limit = find_limit(scores[setting], draws[setting], false_alarms)
         return limit, scores > limit
 
     def judge(alarm: Alarm, own: Readings) -> dict[str, Any]:
@@ -410,13 +407,12 @@ def show_interval(numbers: np.ndarray, form: str, greatest: float = math.inf) ->
 def list_numbers(found: xr.Dataset) -> list[str]:
     """Return what was judged, and how, as labelled numbers."""
     attrs = found.attrs
-    factor, limits = attrs["factor"], f"for {100 * attrs['rate']:.2g} % of false alarms"
     return [
         f"study: {attrs['study']}",
         f"sound machines: {attrs['sound_jobs']} jobs of {attrs['sound_draws']} draws",
         f"worn machines: {attrs['worn_jobs']} jobs",
         f"windows: {attrs['revolutions']} revolutions",
-        f"limits: {limits if math.isnan(factor) else f'{factor:g} times the usual reading'}",
+        f"limits: for {100 * attrs['rate']:.2g} % of false alarms",
         f"detects: trips in {attrs['detected']:.0%} of windows, from that clearance on",
     ]
 
@@ -428,7 +424,7 @@ def list_warnings(found: xr.Dataset) -> Iterator[str]:
         yield f"left out: {count} {reason}"
     if attrs["clipped"]:
         yield f"clipped: {attrs['clipped']} jobs; raise sensor.range_m_per_s2"
-    if math.isnan(attrs["factor"]) and attrs["rate"] > attrs["wanted"] * (1.0 + 1e-9):
+    if attrs["rate"] > attrs["wanted"] * (1.0 + 1e-9):
         yield (f"{attrs['sound_draws']} sound draws allow no limit for {100 * attrs['wanted']:.2g} "
                f"% of false alarms: {math.ceil(1.0 / attrs['wanted']) - 1} are needed")  # fmt: skip
     absent = [one.title for one in ALARMS if one.title not in found["kind"].values]

@@ -16,7 +16,7 @@ from compressor.studies.alarms.alarms import (
 from compressor.studies.alarms.readings import LADDER, RECORD, band_velocity, read_windows
 from compressor.vibration import Record
 
-LEVELS = {0.2: 1.5, 0.3: 2.5, 0.4: 6.0}  # clearance, mm -> rms over the sound one
+LEVELS = {0.2: 1.0, 0.3: 2.5, 0.4: 6.0}  # clearance, mm -> rms over the sound one
 
 
 def made_windows(sound=20, draws=10, every_second=0.3, worn="draw"):
@@ -46,8 +46,8 @@ def made_windows(sound=20, draws=10, every_second=0.3, worn="draw"):
     return Windows(np.array(joints), np.array(clearances), draws, draws, {(0, RECORD): readings}, 0)
 
 
-def judge(windows, noise=(0.0,), factor=2.0, detected=0.9):
-    return judge_windows(windows, noise, 0.05, factor, detected)
+def judge(windows, noise=(0.0,), detected=0.9):
+    return judge_windows(windows, noise, 0.05, detected)
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,8 @@ def test_rates_of_made_up_windows_are_known(judged):
     assert one["clearance"].values.tolist() == [*LEVELS]
     assert one["detection"].sel(end="value").values.tolist() == [0.0, 0.5, 1.0]
     assert one["draws"].values.tolist() == [10, 10, 10]
-    assert float(one["false_alarms"].sel(end="value")) == 0.0
+    # the loudest sound draw is above the limit that the others set
+    assert float(one["false_alarms"].sel(end="value")) == pytest.approx(1 / 20)
     assert one["first_clearance"].sel(joint="small_end").values.tolist() == [0.4, 0.4, math.inf]
     assert judged["alarm"].values[rank_alarms(judged, "small_end")[0]] == "rms, record"
 
