@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
+from compressor.program import PROGRAM
 from compressor.store.files import StoreError, publish, system_error
 
 if TYPE_CHECKING:
@@ -162,9 +163,9 @@ def dimensions_of(data: Any, names: Sequence[str]) -> list[str]:
 def write_dataset(path: Path, dataset: "xr.Dataset") -> Path:
     """Write a Dataset as netCDF-4, whole or not at all; return its path.
 
-    Raises StoreError where the disk refuses.
+    Its attribute `program` says what wrote it. Raises StoreError where the disk refuses.
     """
-    publish(path, encode_dataset(dataset))
+    publish(path, encode_dataset(dataset.assign_attrs(program=PROGRAM)))
     return path
 
 

@@ -24,16 +24,7 @@ from scipy.optimize import least_squares
 from compressor.cases import Case, design, load_studies
 from compressor.program import Progress, no_progress
 from compressor.store import Folder, job_record, read_store
-from compressor.studies.frame import (
-    DIGITS,
-    USABLE,
-    GrowingStudy,
-    KeySpan,
-    Point,
-    StudyError,
-    by_revolutions,
-    replace_settings,
-)
+from compressor.studies import frame
 from compressor.vibration import Record
 
 # ---- a record's orders
@@ -60,7 +51,7 @@ def orders_of(record: Record) -> Orders:
 
     Raises RecordError as `vibration.check_record`.
     """
-    turned = by_revolutions(record)
+    turned = frame.by_revolutions(record)
     lines, speed = math.sqrt(2.0) * turned.lines(turned.highest), turned.speed
     count, highest = lines.shape
     scatter = lines.var(axis=0, ddof=1) if count > 1 else np.zeros(highest)
@@ -264,27 +255,27 @@ class FitJobs:
     """Evaluates orders of a case at values of its unknown keys, by jobs of one study."""
 
     def __init__(
-        self, path: str, unknowns: Sequence[KeySpan], overrides: Sequence[str],
+        self, path: str, unknowns: Sequence[frame.KeySpan], overrides: Sequence[str],
         folder: Folder, workers: int, progress: Progress,
     ):  # fmt: skip
         self.unknowns, self.folder, self.plain = tuple(unknowns), folder, [*overrides]
         keys = [one.key for one in unknowns]
-        self.study = GrowingStudy(
+        self.study = frame.GrowingStudy(
             path, keys, "-calibrate", folder, overrides, workers, progress, FEW
         )
         self.highest = 0  # order that is compared
         self.middle = self.case_at(np.full(len(unknowns), 0.5))
         if self.middle.body is None or self.middle.sensor is None:
-            raise StudyError(
+            raise frame.StudyError(
                 f"{path} has no sensor to compare a record with: add body and sensor to it"
             )
 
     def run_at(self, rpm: float) -> None:
         """Let the case run at a speed, in place of its own, and without noise."""
-        self.plain = replace_settings(self.plain, f"{SPEED}={rpm:.{DIGITS}g}")
-        self.study.overrides = tuple(replace_settings(self.plain, *QUIET))
+        self.plain = frame.replace_settings(self.plain, f"{SPEED}={rpm:.{frame.DIGITS}g}")
+        self.study.overrides = tuple(frame.replace_settings(self.plain, *QUIET))
 
-    def point(self, shares: np.ndarray) -> Point:
+    def point(self, shares: np.ndarray) -> frame.Point:
         """Return the values of the keys at shares of their ranges."""
         pairs = zip(self.unknowns, shares.tolist(), strict=True)
         return tuple(one.value(share) for one, share in pairs)
@@ -292,11 +283,12 @@ class FitJobs:
     def case_at(self, shares: np.ndarray) -> Case:
         """Return the case at shares of the ranges. Raises CaseFileError and StudyError."""
         pairs = zip(self.unknowns, self.point(shares), strict=True)
-        texts = replace_settings(self.plain, *(f"{one.key}={value!r}" for one, value in pairs))
+        fitted = (f"{one.key}={value!r}" for one, value in pairs)
+        texts = frame.replace_settings(self.plain, *fitted)
         (found,) = load_studies(self.study.path, overrides=texts)
         if found.jobs != 1:
             axes = ", ".join(axis.key for axis in found.axes)
-            raise StudyError(
+            raise frame.StudyError(
                 f"{self.study.path} makes {found.jobs} jobs where one machine is fitted, by "
                 f"{axes}: choose one case by --set"
             )
@@ -320,7 +312,7 @@ class FitJobs:
 
 
 def calibrate(
-    record: Record, path: str, unknowns: Sequence[KeySpan], folder: Folder,
+    record: Record, path: str, unknowns: Sequence[frame.KeySpan], folder: Folder,
     overrides: Sequence[str] = (), workers: int = 2, progress: Progress = no_progress,
 ) -> Calibration:  # fmt: skip
     """Return what a record of a sound machine says of a case's unknown keys.
@@ -330,21 +322,21 @@ def calibrate(
     Raises CaseFileError, StudyError, StoreError and WorkersFailed.
     """
     if not unknowns:
-        raise StudyError("nothing is to be fitted: give --fit KEY=LOW:HIGH")
+        raise frame.StudyError("nothing is to be fitted: give --fit KEY=LOW:HIGH")
     if any(one.key == SPEED for one in unknowns):
-        raise StudyError(f"{SPEED} is the record's own: leave it out of --fit")
+        raise frame.StudyError(f"{SPEED} is the record's own: leave it out of --fit")
     measured = orders_of(record)
     jobs = FitJobs(path, unknowns, overrides, folder, workers, progress)
     rpm_given = jobs.middle.machine.speed_rpm
     jobs.run_at(60.0 * measured.speed)
     sensor = jobs.middle.sensor
     assert sensor is not None
-    corner = min(sensor.low_pass_Hz or math.inf, sensor.rate_Hz / USABLE)
+    corner = min(sensor.low_pass_Hz or math.inf, sensor.rate_Hz / frame.USABLE)
     # the highest order that both hold; a job's own count may be one less by rounding
     jobs.highest = min(len(measured.amplitudes), int(corner / measured.speed * (1.0 - 1e-9)))
     if not jobs.highest:
         what = f"its sensor's band holds no order of {60 * measured.speed:.6g} rpm"
-        raise StudyError(f"{path}: {what}: raise sensor.low_pass_Hz")
+        raise frame.StudyError(f"{path}: {what}: raise sensor.low_pass_Hz")
     starts = np.array(design("lhs", POINTS_A_KEY * len(unknowns), len(unknowns), SEED))
     amplitudes, errors = measured.amplitudes[: jobs.highest], measured.errors[: jobs.highest]
     fit = fit_orders(jobs, amplitudes, errors, starts)
@@ -352,7 +344,7 @@ def calibrate(
     if not study.jobs:
         raise next(iter(study.refused.values()))  # no point of the ranges makes a case
     if fit is None:
-        raise StudyError(f"each job of study {study.name} failed: compsim status shows why")
+        raise frame.StudyError(f"each job of study {study.name} failed: compsim status shows why")
     ends = np.clip([[0.0], [-SURE], [SURE]] * fit.deviations + fit.shares, 0.0, 1.0)
     keys = {one.key: Fitted(*map(one.value, column))
             for one, column in zip(unknowns, ends.T.tolist(), strict=True)}  # fmt: skip

@@ -18,7 +18,7 @@ import xarray as xr
 from compressor.analysis import interpolate_hours, rubbing_work, settled_part, settled_revolutions
 from compressor.cases import Case, CaseError, Output, PerJoint, Study, Wear, points, to_si
 from compressor.metrics import JOINTS, METRICS
-from compressor.program import PROGRAM, Progress
+from compressor.program import Progress
 from compressor.reasons import Reason
 from compressor.report import PlotlyFigure, make_grid, style
 from compressor.solve import simulate
@@ -141,7 +141,7 @@ class Worn:
         about = {"units": "m3", "long_name": "volume that is worn off"}
         found["worn_volume"] = ("stage", "joint"), worn * self.bore_area, about
         where = {"joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"})}
-        attrs = {"key": self.key, "program": PROGRAM, "case": self.case.attributes()["case"]}
+        attrs = {"key": self.key, "case": self.case.attributes()["case"]}
         return found.assign_coords(where).assign_attrs(attrs)
 
 

@@ -12,6 +12,7 @@ from compsim import cli
 from conftest import flip
 from made_jobs import batches, held, key, made, plan
 
+from compressor.program import PROGRAM
 from compressor.store.batch import write_batch
 from compressor.store.files import StoreError, StoreWarning, discard_leftovers, publish
 from compressor.store.netcdf import DamagedFile, read_dataset, write_dataset
@@ -174,7 +175,7 @@ def test_damage_to_a_machine_that_was_followed_is_told(tmp_path, compsim):
             "load": (("stage", "joint"), [[1.0, 2.0]] * 3),
         },
         {"stage": [1, 2, 3]},
-        {"key": "0123456789abcdef0123", "model_version": 2},
+        {"key": "0123456789abcdef0123", "program": PROGRAM},
     )
     path = write_dataset(tmp_path / "follow/chains/0123456789abcdef0123.nc", kept)
     whole = read_dataset(path)

@@ -15,10 +15,10 @@ import numpy as np
 import xarray as xr
 
 from compressor.cases import Case, Sensor
-from compressor.program import PROGRAM, Progress, no_progress
+from compressor.program import Progress, no_progress
 from compressor.store import Folder, find_study
+from compressor.studies import frame
 from compressor.studies.diagnosis.features import FEATURES, features
-from compressor.studies.frame import RecordedJob, cut_windows, no_records, records
 from compressor.vibration import RecordError
 
 # groups of a case that are no part of a machine
@@ -40,7 +40,7 @@ class Label(NamedTuple):
 
     unit: str
     phrase: str
-    read: Callable[[RecordedJob], Any]
+    read: Callable[[frame.RecordedJob], Any]
 
 
 def name_machine(case: Case) -> str:
@@ -84,7 +84,7 @@ def make_data_set(
     left: Counter[str] = Counter()
     rows: list[dict[str, Any]] = []
     clipped: list[float] = []
-    for job in records(folder, source, left, progress):
+    for job in frame.records(folder, source, left, progress):
         labels = {name: label.read(job) for name, label in LABELS.items()}
         try:
             own = [
@@ -94,7 +94,7 @@ def make_data_set(
                     "signal": window.values.astype(np.float32), "rate": window.rate,
                     "tacho": window.tacho.copy(),
                 }
-                for first, window in cut_windows(job.record, revolutions)
+                for first, window in frame.cut_windows(job.record, revolutions)
             ]  # fmt: skip
         except RecordError:
             left["silent_record"] += 1
@@ -103,9 +103,9 @@ def make_data_set(
         rows += own
         clipped += [float(job.outcome.numbers["clipped_fraction"])] if own else []
     if not rows:
-        raise no_records(source, +left, revolutions)
+        raise frame.no_records(source, +left, revolutions)
     return stack_rows(rows).assign_attrs(
-        title=f"compsim: labelled windows of {source.name}", comment=NOT_IN_IT, program=PROGRAM,
+        title=f"compsim: labelled windows of {source.name}", comment=NOT_IN_IT,
         study=source.name, case_file=source.case_file, fixed=json.dumps(source.fixed),
         versions=json.dumps(source.versions), jobs=len({*source.keys}), left_out=json.dumps(+left),
         revolutions=revolutions, clipped_most=float(np.nanmax([0.0, *clipped])),

@@ -26,9 +26,9 @@ from compressor.digits import align_columns
 from compressor.metrics import JOINTS
 from compressor.program import Progress, no_progress
 from compressor.store import Folder, find_study
+from compressor.studies import frame
 from compressor.studies.diagnosis.dataset import name_machine
 from compressor.studies.diagnosis.features import features
-from compressor.studies.frame import StudyError, no_records, records
 from compressor.vibration import MIN_REVOLUTIONS, Record, RecordError
 
 MIN_JOBS, MIN_IN_ALL = 30, 200  # jobs of one joint, for it to be identified, and of all
@@ -79,7 +79,7 @@ def read_library(folder: Folder, study: str, progress: Progress = no_progress) -
     """Return the library of a stored study. Raises StudyError without a record, and StoreError."""
     source, left = find_study(folder, study), Counter[str]()
     rows: list[tuple[Any, ...]] = []
-    for job in records(folder, source, left, progress):
+    for job in frame.records(folder, source, left, progress):
         try:
             found = np.array([*features(job.record).values()])
         except RecordError:
@@ -88,7 +88,7 @@ def read_library(folder: Folder, study: str, progress: Progress = no_progress) -
         ends = [getattr(job.case.clearance_mm, side) for side in JOINTS]
         rows.append((job.key, job.case.worn_joint, ends, found, name_machine(job.case)))
     if not rows:
-        raise no_records(source, left, MIN_REVOLUTIONS)
+        raise frame.no_records(source, left, MIN_REVOLUTIONS)
     keys_of = (axis.key for axis in source.axes)
     swept = [key for key in keys_of if key.partition(".")[0] not in IDENTIFIED]
     keys, joints, opened, found, machines = map(np.array, zip(*rows, strict=True))
@@ -258,7 +258,7 @@ class Identifier:
             numbers = ", ".join(f"{joint} {count}" for joint, count in counts.items())
             problem = f"study {library.study} has too few jobs with a sensor's record: {numbers}"
             least = f"{MIN_JOBS} of each joint and {MIN_IN_ALL} in all, better thousands"
-            raise StudyError(f"{problem}; draw at least {least}")
+            raise frame.StudyError(f"{problem}; draw at least {least}")
         middle = np.nan_to_num(np.nanmedian(library.features, axis=0))
         filled = np.where(np.isnan(library.features), middle, library.features)
         scale = np.maximum(filled.std(axis=0), MIN_SPREAD)

@@ -6,22 +6,19 @@ coordinate `attrs["over"]` names, and those of the variables.
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
 from compressor.analysis import SPOKEN
 from compressor.digits import align_columns
-from compressor.report import FOOT, MARKS, Panel, PlotlyFigure, make_grid, midway, positions, style
+from compressor.report import Panel, PlotlyFigure, make_grid, midway, positions, style
 
 # the second is smaller and lies on the first, so that both are seen where they agree
 BY_DIRECTION = {"up": (style.BLUE, 4.0, 2.2), "down": (style.RED, 2.1, 2.4)}
 # rows of the panel of periods: 1 to 4 one by one, up to 16 by octaves, and where there is none
 PERIODS = {1: 0.0, 2: 1.0, 3: 2.0, 4: 3.0, 8: 4.0, 16: 5.0}
 ROWS_OF = {"chaotic": 6.2, "undecided": 7.2}
-FAILED = replace(MARKS["failed"], color=style.BLACK, markersize=5, edge_width=1.3)
-FAILED_NAME = "a run failed here"
 MILLI = 1e3
 
 
@@ -95,11 +92,6 @@ def draw_followed(machine: xr.Dataset, title: str = "") -> PlotlyFigure:
         leave_room(panel)
     low, *_, high = midway(np.sort(x), log)
     panels[0].span("x", low, high)
-    has_failed = (machine["status"] == "failed").any("direction").values
-    for panel in panels if has_failed.any() else ():
-        bottom, top = panel.y.range
-        foot = np.full(has_failed.sum(), bottom + FOOT["failed"] * (top - bottom))
-        panel.plot(x[has_failed], foot, FAILED, FAILED_NAME)
     drawing.title = title
     return drawing.figure()
 
@@ -124,7 +116,7 @@ def plot_periods(panel: Panel, x: np.ndarray, chains: dict[str, xr.Dataset]) -> 
     plot(panel, x, {name: period_rows(chain) for name, chain in chains.items()}, 1.2)
     rows = PERIODS | ROWS_OF
     panel.name_ticks("y", [*map(str, rows)], [*rows.values()])
-    panel.span("y", -1.3, max(ROWS_OF.values()) + 0.6)
+    panel.span("y", -0.6, max(ROWS_OF.values()) + 0.6)
     panel.title = "period (revolutions)"
 
 
@@ -154,8 +146,8 @@ def plot_exponents(panel: Panel, x: np.ndarray, chains: dict[str, xr.Dataset]) -
 
 
 def leave_room(panel: Panel) -> None:
-    """Leave room below the points for marks, and a little above them."""
+    """Leave a little room below and above the points."""
     drawn = np.concatenate([trace.y for trace in panel.traces])
     low, high = (np.nanmin(drawn), np.nanmax(drawn)) if np.isfinite(drawn).any() else (0.0, 1.0)
     room = 0.05 * (high - low) or 0.05 * abs(high) or 0.05
-    panel.span("y", low - 3.0 * room, high + room)
+    panel.span("y", low - room, high + room)

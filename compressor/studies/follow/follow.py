@@ -21,19 +21,10 @@ import xarray as xr
 
 from compressor.cases import Case, CaseFileError, Output, Study, load_studies, points
 from compressor.metrics import JOINTS
-from compressor.program import PROGRAM, Progress
+from compressor.program import Progress
 from compressor.store import Folder, coordinate_names, swept_column, writable_folder, write_dataset
+from compressor.studies import frame
 from compressor.studies.follow import motion
-from compressor.studies.frame import (
-    KeySpan,
-    Row,
-    StudyError,
-    hash_key,
-    read_range,
-    rows_dataset,
-    run_rows,
-    stored_rows,
-)
 from compressor.sweep import End
 
 FOLDER = "follow"
@@ -44,7 +35,7 @@ NOT_FOLLOWED = ("solve", "output", "body", "sensor", "initial_offset_mm")
 
 
 @dataclass(frozen=True)
-class KeyRange(KeySpan):
+class KeyRange(frame.KeySpan):
     """The values of a key, and how they are followed.
 
     `both`: up and then down, each from its own start; `points`: Poincaré points of a motion that
@@ -63,12 +54,12 @@ class KeyRange(KeySpan):
 
 def read_over(text: str, log: bool = False, **more: Any) -> KeyRange:
     """Return what a text KEY=LOW:HIGH:N asks for; more: other fields. Raises StudyError."""
-    span = read_range("--over", text, True, log)
+    span = frame.read_range("--over", text, True, log)
     if span.key.partition(".")[0] in NOT_FOLLOWED:
         problem = f"{span.key} is nothing of the machine: give a key such as clearance_mm"
-        raise StudyError(f"--over {text}: {problem}")
+        raise frame.StudyError(f"--over {text}: {problem}")
     if span.count < 2:
-        raise StudyError(f"--over {text}: {span.count} value: give 2 at least")
+        raise frame.StudyError(f"--over {text}: {span.count} value: give 2 at least")
     return KeyRange(**vars(span), **more)
 
 
@@ -106,7 +97,8 @@ class Chain:
 
     @cached_property
     def key(self) -> str:
-        return hash_key([[case.key for case in self.cases], [self.points, self.exponent], SCHEMA])
+        keys = [case.key for case in self.cases]
+        return frame.hash_key([keys, [self.points, self.exponent], SCHEMA])
 
     def path(self, folder: Folder) -> Path:
         return Path(folder) / FOLDER / "chains" / f"{self.key}.nc"
@@ -119,19 +111,19 @@ class Chain:
     def seconds(self) -> float:
         return RUNS * sum(case.solve.timeout_s for case in self.cases)
 
-    def count_done(self, rows: Sequence[Row]) -> int:
+    def count_done(self, rows: Sequence[frame.Row]) -> int:
         return len(rows)
 
-    def make_row(self, rows: Sequence[Row]) -> Row:
+    def make_row(self, rows: Sequence[frame.Row]) -> frame.Row:
         """Run the next value, from the last one's end, or from its own start without one."""
         state = rows[-1]["end_state"] if rows else None
         begin = None if state is None or np.isnan(state).any() else state
         return motion.run_value(self.cases[len(rows)], begin, self.points, self.exponent)
 
-    def to_dataset(self, rows: Sequence[Row]) -> xr.Dataset:
+    def to_dataset(self, rows: Sequence[frame.Row]) -> xr.Dataset:
         """Return its rows, with the dimension `value` in the order of running."""
-        attrs = {"key": self.key, "case": self.cases[0].attributes()["case"], "program": PROGRAM}
-        found = rows_dataset(rows, "value", motion.TEXTS, motion.NUMBERS)
+        attrs = {"key": self.key, "case": self.cases[0].attributes()["case"]}
+        found = frame.rows_dataset(rows, "value", motion.TEXTS, motion.NUMBERS)
         return found.assign_coords(value=[*self.values[: len(rows)]]).assign_attrs(attrs)
 
 
@@ -155,7 +147,7 @@ def machines(study: Study, along: KeyRange) -> list[FollowedMachine]:
     for point, jobs in found.values():
         if problem := objection(along, [case for _, case in jobs]):
             where = ", ".join(f"{key} {value}" for key, value in point.items())
-            raise StudyError(f"{study.path}: {problem}{f' ({where})' if where else ''}")
+            raise frame.StudyError(f"{study.path}: {problem}{f' ({where})' if where else ''}")
         jobs.sort(key=itemgetter(0))
         ways = ((*zip(*one, strict=True),) for one in (jobs, jobs[::-1])[: len(along.ways)])
         chains = (Chain(cases, values, along.points, along.exponent) for values, cases in ways)
@@ -204,7 +196,7 @@ def follow(
     every = machines(study, along)
     writable_folder(folder)
     chains = [chain for machine in every for chain in machine.chains]
-    before, lost = run_rows(chains, folder, workers, progress, rerun)
+    before, lost = frame.run_rows(chains, folder, workers, progress, rerun)
     rows = [
         [rows_to_show(chain, folder, lost.get(chain.key)) for chain in machine.chains]
         for machine in every
@@ -215,9 +207,9 @@ def follow(
     return Followed(sum(chain.size for chain in chains), before, data, path)
 
 
-def rows_to_show(chain: Chain, folder: Folder, end: End | None) -> list[Row]:
+def rows_to_show(chain: Chain, folder: Folder, end: End | None) -> list[frame.Row]:
     """Return the rows of a chain, at least one; end: how it was lost, at the value after them."""
-    rows = stored_rows(chain, folder)
+    rows = frame.stored_rows(chain, folder)
     blank = motion.empty_row(chain.cases[0], chain.points) | {"status": "missing"}
     if end and len(rows) < len(chain.cases):
         failed = {"status": "failed", "reason": str(end.reason), "detail": end.detail}
@@ -225,7 +217,9 @@ def rows_to_show(chain: Chain, folder: Folder, end: End | None) -> list[Row]:
     return rows or [blank]
 
 
-def differing(machine: FollowedMachine, up: Sequence[Row], down: Sequence[Row]) -> set[float]:
+def differing(
+    machine: FollowedMachine, up: Sequence[frame.Row], down: Sequence[frame.Row]
+) -> set[float]:
     """Return the values at which a machine ends in different motions on its ways up and down."""
     first, last = machine.chains
     other = dict(zip(last.values, down, strict=False))
@@ -237,7 +231,10 @@ def differing(machine: FollowedMachine, up: Sequence[Row], down: Sequence[Row]) 
 
 
 def followed_dataset(
-    study: Study, along: KeyRange, every: Sequence[FollowedMachine], rows: Sequence[list[list[Row]]]
+    study: Study,
+    along: KeyRange,
+    every: Sequence[FollowedMachine],
+    rows: Sequence[list[list[frame.Row]]],
 ) -> xr.Dataset:
     """Return the rows of all chains as one Dataset.
 
@@ -278,6 +275,5 @@ def followed_dataset(
     )
     data.attrs = {
         "study": study.name, "title": study.title, "over": over, "log": int(along.log),
-        "program": PROGRAM,
     }  # fmt: skip
     return data

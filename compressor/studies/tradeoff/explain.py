@@ -11,16 +11,13 @@ from typing import Any
 
 from compressor.cases import ACCURACY, Case, Study, points
 from compressor.digits import align_columns, plural
-from compressor.program import Progress, duration, no_progress
-from compressor.studies.tradeoff import variants
-from compressor.studies.tradeoff.changes import ModelTable, model_table, percent
+from compressor.program import Progress, duration
+from compressor.studies.tradeoff import changes, variants
 
 PEAKS = {"peak_acceleration": "acceleration", "peak_contact_force": "force"}
 
 
-def explain(
-    study: Study, job: int, workers: int, progress: Progress = no_progress
-) -> dict[str, Any]:
+def explain(study: Study, job: int, workers: int, progress: Progress) -> dict[str, Any]:
     """Return what is known of a job of a study, by running it, too, without each feature.
 
     Seconds are the best of some runs, if they are short. `advice` is of each feature that the job
@@ -31,7 +28,7 @@ def explain(
     advice: Sequence[dict[str, Any]] = ()
     if run["status"] == "ok" and run["steps"] > 0:
         paid = [one for one in variants.make_variants(case) if one.left_out]
-        table = model_table(variants.run_variants(case, paid, progress))
+        table = changes.model_table(variants.run_variants(case, paid, progress))
         advice = [*advise(paid, table, case)]
     return {
         "study": study.name,
@@ -52,7 +49,7 @@ def explain(
 
 
 def advise(
-    paid: Sequence[variants.Variant], table: ModelTable, case: Case
+    paid: Sequence[variants.Variant], table: changes.ModelTable, case: Case
 ) -> Iterator[dict[str, Any]]:
     """Yield how leaving each feature out changes peaks and time, and what it is needed for.
 
@@ -60,22 +57,20 @@ def advise(
     """
     left_out = {one.name: one.left_out for one in paid}
     for row in table.rows:
-        changes = {}
+        moved = {}
         for name, words in PEAKS.items():
             every = [
                 size
                 for m, size in zip(table.measures, row.changes, strict=True)
                 if m.variable == name and m.joint in ("", *variants.faulty(case))
             ]
-            changes[words] = max(
-                every, key=lambda size: (size != size, abs(size)), default=math.nan
-            )
+            moved[words] = max(every, key=lambda size: (size != size, abs(size)), default=math.nan)
         yield {
             "name": row.name,
             "left_out": left_out[row.name],
-            "changes": changes,
+            "changes": moved,
             "time_ratio": row.time_ratio,
-            "needed_for": [w for w, size in changes.items() if abs(size) >= promise(case)],
+            "needed_for": [w for w, size in moved.items() if abs(size) >= promise(case)],
             "note": row.note,
         }
 
@@ -99,14 +94,14 @@ def list_explanation(facts: dict[str, Any]) -> Iterator[str]:
     """Yield an explanation as it is printed."""
     point = ", ".join(f"{key} = {value}" for key, value in facts["point"].items())
     yield f"{facts['study']}: {plural(facts['jobs'])}" + (f"; explained: {point}" if point else "")
-    within = f"for errors below {percent(facts['promise'])}"
+    within = f"for errors below {changes.percent(facts['promise'])}"
     yield f"rtol {facts['rtol']:g}, {facts['method']}, {within}"
     if facts["reason"]:
         yield f"the job failed, {facts['reason']}: {facts['detail']}"
     else:
         yield from cost_lines(facts)
     if facts["advice"]:
-        limit = percent(facts["promise"])
+        limit = changes.percent(facts["promise"])
         head = ("without a feature", *PEAKS.values(), "time", f"needed, or below {limit}: can go")
         yield from align_columns([head, *map(advice_row, facts["advice"])], "<>>>")
 
@@ -128,8 +123,8 @@ def short_time(seconds: float) -> str:
 def advice_row(advice: dict[str, Any]) -> tuple[str, ...]:
     """Return how a feature moves peaks and time, and how to leave it out if it is not needed."""
     sizes = advice["changes"].values()
-    changes = ("unknown" if math.isnan(size) else percent(size, "+") for size in sizes)
+    texts = ("unknown" if math.isnan(size) else changes.percent(size, "+") for size in sizes)
     is_open = any(map(math.isnan, sizes))
     why = advice["note"] or "not known, as of a chaotic motion"
     verdict = "needed" if advice["needed_for"] else why if is_open else advice["left_out"]
-    return advice["name"], *changes, f"× {advice['time_ratio']:.2g}", verdict
+    return advice["name"], *texts, f"× {advice['time_ratio']:.2g}", verdict

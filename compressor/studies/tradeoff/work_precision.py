@@ -14,7 +14,6 @@ import xarray as xr
 
 from compressor.cases import ACCURACY, METHODS, Study, load_studies, points
 from compressor.digits import align_columns
-from compressor.program import PROGRAM, Progress, no_progress
 from compressor.report import Panel, PlotlyFigure, make_grid, rectangle, style
 from compressor.store import Folder, read_job, read_store
 from compressor.studies.frame import MAX_NAME, StudyError, replace_settings, without_keys
@@ -41,9 +40,7 @@ VARIABLES = {  # of a point -> attributes
 }
 
 
-def load_methods(
-    path: str, overrides: Sequence[str], folder: Folder, progress: Progress = no_progress
-) -> tuple[Study, list[str]]:
+def load_methods(path: str, overrides: Sequence[str], folder: Folder) -> tuple[Study, list[str]]:
     """Return the study of a case file by methods and tolerances, and what it sets in the file.
 
     Where the file lets a run find its own length, it is run, and all methods get the longest one.
@@ -59,7 +56,7 @@ def load_methods(
     settings = [f"name={own.name[: MAX_NAME - len(ENDING)]}{ENDING}", *SETTINGS]
     given = [case.solve.duration_rev for case in own.cases]
     if "auto" in [*given, *(case.solve.settle_rev for case in own.cases)]:
-        sweep([own], folder, 1, progress, Options(overrides=of_file))
+        sweep([own], folder, 1, options=Options(overrides=of_file))
         runs = [(case, read_job(folder, case.key)) for case in own.cases]
         settle = max(round(run.attrs.get("settle", 0.0) / case.turn, 6) for case, run in runs)
         duration = max(settle + SETTLED_REV, *(one for one in given if isinstance(one, float)), 0.0)
@@ -87,7 +84,7 @@ def work_precision(folder: Folder, study: Study) -> xr.Dataset:
         rows.append(row)
     for scene in dict.fromkeys(row["scene"] for row in rows):
         judge([row for row in rows if row["scene"] == scene and "acceleration" in row])
-    return tabulate(rows).assign_attrs({"study": study.name, "program": PROGRAM})
+    return tabulate(rows).assign_attrs(study=study.name)
 
 
 def tabulate(rows: Sequence[Mapping[str, Any]]) -> xr.Dataset:

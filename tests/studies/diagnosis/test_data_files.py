@@ -34,7 +34,7 @@ def test_the_command(made, worn, tmp_path, compsim):
     with xr.open_dataset(place / "windows.nc", engine="h5netcdf") as found:
         assert found["signal"].attrs["units"] == "m/s2"
         assert found.attrs["comment"].startswith("Everything is simulated")
-        assert found.attrs["program"] == made.attrs["program"]
+        assert found.attrs["program"].startswith("compsim ")
         for name in made.variables:
             there, here = found[name].values, made[name].values
             assert np.array_equal(there, here, equal_nan=here.dtype.kind == "f"), name

@@ -8,7 +8,8 @@ from compressor.store.files import StoreError
 from compressor.store.reader import read_store
 from compressor.store.sensor_records import find_record
 from compressor.studies.diagnosis.features import features
-from compressor.studies.diagnosis.identify import StudyError, read_library
+from compressor.studies.diagnosis.identify import read_library
+from compressor.studies.frame import StudyError
 from compressor.vibration import Record
 
 

@@ -13,9 +13,9 @@ from compressor.studies.diagnosis.identify import (
     Clearance,
     Identifier,
     Library,
-    StudyError,
     split_into_folds,
 )
+from compressor.studies.frame import StudyError
 
 JOINTS = np.array(["none", "big_end", "small_end", "both"])
 LOADING = np.random.default_rng(0).normal(size=(4, len(FEATURES)))

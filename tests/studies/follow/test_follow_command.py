@@ -7,8 +7,9 @@ from compsim import cli
 from conftest import jobs_here
 
 from compressor.cases import CaseFileError
-from compressor.studies.follow.follow import StudyError, load_values, machines, read_over
+from compressor.studies.follow.follow import load_values, machines, read_over
 from compressor.studies.follow.motion import NUMBERS, TEXTS
+from compressor.studies.frame import StudyError
 
 TEXT = """
 joint: big_end

@@ -5,6 +5,7 @@ from conftest import write_cases
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
+from compressor.program import no_progress
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.explain import advice_row, explain
 from compressor.studies.tradeoff.variants import choose_job
@@ -20,7 +21,7 @@ def explained(tmp_path):
         values["solve"] = SOLVE | values.get("solve", {})
         values = {"joint": "big_end", "clearance_mm": 0.2} | values
         (study,) = load_studies(*write_cases(tmp_path, made=values))
-        return explain(study, choose_job(study, tmp_path)[0], workers=2)
+        return explain(study, choose_job(study, tmp_path)[0], 2, no_progress)
 
     return made
 
