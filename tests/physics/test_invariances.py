@@ -313,7 +313,7 @@ def test_a_joint_without_clearance_costs_nothing(joint):
 # ---- vanishing clearance
 
 
-@settings(FEW, max_examples=15)
+@settings(FEW, max_examples=8)
 @given(scenes())
 def test_a_clearance_that_vanishes_leaves_the_ideal_machine(values):
     """With the contact scaled along (K as c^-1.5, d_max as c, C_max as c^-0.5) the deviation goes
