@@ -304,7 +304,7 @@ def started(tmp_path, answering):
     )
     command = [sys.executable, "-c", "import sys; from compsim.cli import main; sys.exit(main())"]
     process = subprocess.Popen(
-        [*command, "run", "many.yaml"],
+        [*command, "run", "many.yaml", "-j", "1"],
         cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
     try:

@@ -325,7 +325,7 @@ def test_a_clearance_that_vanishes_leaves_the_ideal_machine(values):
             "full_damping_mm": 0.1 * size,
             "damping_N_s_per_mm": 336 * size**-0.5,
         }
-        found = integrate(request({**values, "clearance_mm": size, "contact": contact}, 2e-5))
+        found = integrate(request({**values, "clearance_mm": size, "contact": contact}, 2e-5, 0.1))
         assert found.reason == ""
         moved.append(np.abs(found.states[:, 0]).max())
     slopes = np.diff(np.log(moved)) / np.diff(np.log(sizes))
