@@ -12,7 +12,6 @@ import platform
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -125,10 +124,9 @@ def answer_section(answer: FirstScreen) -> Section:
 
 def study_findings(data: xr.Dataset, units: Units = "usual") -> list[MetricChange]:
     """Return the metrics that change most over a study's jobs, as `open_study` gives it."""
-    points = Points(data)
     numbers = ((m, read_numbers(m, data)) for m in measures(data, units))
     rows = [(m, values.ravel(), bars.ravel()) for m, (values, bars) in numbers]
-    return rank_findings(rows, points, worn_joints(data), points.ascending)
+    return rank_findings(rows, name_jobs(data), worn_joints(data), ascending_jobs(data))
 
 
 def read_numbers(measure: Measure, data: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
@@ -154,39 +152,28 @@ def worn_joints(data: xr.Dataset) -> set[str]:
     return {joint for joint in JOINTS if (abs(depth.sel(joint=joint)) > 0.0).any()}
 
 
-class Points(Sequence[str]):
-    """What is swept at each job of a study, in words, made on access."""
+def several_values(data: xr.Dataset) -> dict[str, np.ndarray]:
+    """Return the swept keys of a study's jobs, as `swept_values`, that have several values."""
+    return {name: values for name, values in swept_values(data).items()
+            if "case_key" in data[name].attrs and len({*values.tolist()}) > 1}  # fmt: skip
 
-    def __init__(self, data: xr.Dataset):
-        status = data["status"]
-        self.names = [
-            str(name)
-            for name, of in data.coords.items()
-            if {*of.dims} <= {*status.dims} and "case_key" in of.attrs
-        ]
-        self.data, self.shape, self.dims = data, status.shape, status.dims
 
-    @property
-    def ascending(self) -> list[int]:
-        """Return the numbers of the jobs by the one number that is swept, none without one."""
-        swept = {name: values for name, values in swept_values(self.data).items()
-                 if name in self.names and len({*values.tolist()}) > 1}  # fmt: skip
-        values = next(iter(swept.values()), np.array([]))
-        is_one = len(swept) == 1 and values.dtype.kind in "fiu" and not np.isnan(values).any()
-        return np.argsort(values, kind="stable").tolist() if is_one else []
+def name_jobs(data: xr.Dataset) -> list[str]:
+    """Return what is swept at each job of a study, in words."""
+    words = [
+        [word_value(name, value, data[name].attrs.get("units", "")) for value in values.tolist()]
+        for name, values in several_values(data).items()
+    ]
+    jobs = zip(*words, strict=True) if words else [()] * data["status"].size
+    return [", ".join(filter(None, parts)) for parts in jobs]
 
-    def __len__(self) -> int:
-        return math.prod(self.shape)
 
-    def __getitem__(self, number: Any) -> Any:
-        place = dict(zip(self.dims, np.unravel_index(number, self.shape), strict=True))
-        parts = []
-        for name in self.names:
-            of = self.data[name]
-            if len({*of.values.ravel().tolist()}) > 1:
-                value = of.isel({d: n for d, n in place.items() if d in of.dims}).item()
-                parts.append(word_value(name, value, of.attrs.get("units", "")))
-        return ", ".join(part for part in parts if part)
+def ascending_jobs(data: xr.Dataset) -> list[int]:
+    """Return the numbers of a study's jobs by the one number that is swept, none without one."""
+    swept = [*several_values(data).values()]
+    if len(swept) != 1 or swept[0].dtype.kind not in "fiu" or np.isnan(swept[0]).any():
+        return []
+    return np.argsort(swept[0], kind="stable").tolist()
 
 
 def word_value(name: str, value: object, unit: str) -> str:
@@ -207,8 +194,8 @@ def rank_findings(
 ) -> list[MetricChange]:
     """Return the findings of measures over jobs, the greatest change first, one a metric.
 
-    worn: joints whose contact force is meant; where there is none, that of any. ascending: as of
-    `Points`. Knock comes first.
+    worn: joints whose contact force is meant; where there is none, that of any. ascending: of
+    `ascending_jobs`. Knock comes first.
     """
     best: dict[str, MetricChange] = {}
     for measure, values, bars in rows:

@@ -9,7 +9,7 @@ from compressor.analysis import healthy_twin
 from compressor.cases import Case, stands_for
 from compressor.digits import is_known
 from compressor.metrics import BARRED
-from compressor.report.answer import FORCE, Points
+from compressor.report.answer import FORCE, name_jobs
 from compressor.report.figures.drawing import thin_places
 from compressor.report.figures.sweep_data import MEASURES, Measure, measures, swept_values
 from compressor.report.page import (
@@ -68,7 +68,7 @@ def compare_healthy(
                 count = "all" if len(places) == len(alike) else f"{len(places)} of {len(alike)}"
                 words = f"{count} jobs that differ in clearances alone, from the least on"
             if len(alike) > 1 and force[place] > 0.0:
-                at = Points(data)[place]
+                at = name_jobs(data)[place]
                 words += f"; the greatest contact force in a worn joint is at {at}"
             return _compare(data, case, places, words, units)
     return None
@@ -109,7 +109,7 @@ def _compare(
     healthy = healthy_twin(xr.Dataset(attrs=case.attributes()))
     if healthy is None:
         return None
-    names = Points(data)
+    names = name_jobs(data)
     rows = []
     for measure in measures(data, units):
         if measure.variable in FROM_IDEAL or measure.variable not in healthy:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from compressor.report.answer import Points, finding, rank_findings, study_findings, worn_joints
+from compressor.report.answer import finding, name_jobs, rank_findings, study_findings, worn_joints
 from compressor.report.figures.sweep_data import MEASURES
 from compressor.report.page import format_measure
 
@@ -104,8 +104,8 @@ def test_a_study_s_findings_name_its_points(study):
     (found,) = study_findings(study)
     assert found.at_low == "speed 600 rpm, clearance 0.1 mm"
     assert found.at_high == "speed 500 rpm, clearance 0.3 mm"
-    assert Points(study.isel(speed_rpm=[0]))[1] == "clearance 0.2 mm"
-    assert len(Points(study)) == 6
+    assert name_jobs(study.isel(speed_rpm=[0]))[1] == "clearance 0.2 mm"
+    assert len(name_jobs(study)) == 6
     (alone,) = study_findings(study.isel(speed_rpm=[0], clearance_mm=[0]))
     assert (alone.low, alone.high) == ("", "100 ± 1 m/s²")
 

@@ -45,7 +45,7 @@ class Panel:
     def __init__(self, figure: go.Figure, suffix: str, units: Units = "usual"):
         self.figure, self.suffix, self.units = figure, suffix, units
         self.x, self.y = (figure.layout[f"{way}axis{suffix}"] for way in WAYS)
-        self.factors, self.unit = dict.fromkeys(WAYS, 1.0), dict.fromkeys(WAYS, "")
+        self.factors = dict.fromkeys(WAYS, 1.0)
 
     def axis(self, way: Way) -> Axis:
         """Return the axis `x` or `y`, of plotly."""
@@ -87,8 +87,8 @@ class Panel:
 
     def label(self, way: Way, title: str, unit: str = "") -> None:
         """Name an axis before anything is drawn; `{}` in the title stands for the unit."""
-        self.unit[way], self.factors[way] = unit_in(unit, self.units)
-        self.axis(way).title = title.format(self.unit[way])
+        unit, self.factors[way] = unit_in(unit, self.units)
+        self.axis(way).title = title.format(unit)
 
     def at(self, way: Way, values: ArrayLike) -> np.ndarray:
         """Return places along an axis as they are read there."""
@@ -101,7 +101,7 @@ class Panel:
         if name:
             made.showlegend = all(o.name != name or not o.showlegend for o in self.figure.data)
         elif made.type != "heatmap":
-            made.showlegend = False
+            made.update(showlegend=False, hoverinfo=None if made.name else "skip")
         made.update(xaxis=f"x{self.suffix}", yaxis=f"y{self.suffix}", zorder=round(10 * height),
                     legendgroup=made.name)  # fmt: skip
         self.figure.add_trace(made)
@@ -186,6 +186,7 @@ class Panel:
         made = go.Heatmap(
             x=self.at("x", x), y=self.at("y", y), z=values, zmin=low, zmax=high, name=name,
             colorscale=color_stops(colors), colorbar=scale, showscale=has_scale, text=text,
+            hoverinfo="x+y+text" if is_log else "x+y+z", zhoverformat=".4~r",
         )  # fmt: skip
         self.add(made, 1.0, jobs)
 
@@ -280,13 +281,12 @@ class Drawing:
         self.panels[0].plot([math.nan], [math.nan], style, name)
 
     def figure(self) -> go.Figure:
-        """Return the figure, with what the page tells at its points.
+        """Return the figure.
 
         Axes that share a scale have the ticks of the first of them, and numbers and a title on the
         outside: of x in the lowest panel of a column, of y in the first of a row.
         """
-        named = [one for one in self.drawn.data if one.name]
-        is_unified = all(is_rising(one) for one in named)
+        is_unified = all(is_rising(one) for one in self.drawn.data if one.name)
         for panel, way in itertools.product(self.panels, WAYS):
             axis = panel.axis(way)
             if axis.matches:
@@ -294,10 +294,6 @@ class Drawing:
                 axis.update({name: first[name] for name in SHARED if first[name] is not None})
             if axis.showticklabels is False:
                 axis.title = ""
-        for panel in self.panels:
-            panel.x.unifiedhovertitle = {"text": f"%{{x:.6~g}} {panel.unit['x']}"}
-            for trace in panel.traces:
-                trace.update(hover_words(trace, panel, is_unified))
         self.drawn.layout.update(
             title={"text": self.title.replace("\n", "<br>")},
             hovermode="x unified" if is_unified else "closest",
@@ -309,19 +305,6 @@ def is_rising(trace: Trace) -> bool:
     """Return whether it is a curve from left to right, whose value at an x can be told."""
     return isinstance(trace, go.Scatter) and "lines" in trace.mode and not (
         np.diff(trace.x) < 0).any()  # fmt: skip
-
-
-def hover_words(trace: Trace, panel: Panel, is_unified: bool) -> dict[str, str]:
-    """Return what is told at a point of a trace."""
-    if not trace.name and isinstance(trace, go.Scatter):
-        return {"hoverinfo": "skip"}
-    x, y = (f"%{{{way}:.6~g}} {panel.unit[way]}".rstrip() for way in WAYS)
-    y = y.replace(".6~g", ".4~r")
-    name = f"<extra>{trace.name or panel.title}</extra>"
-    if isinstance(trace, go.Heatmap):
-        value = "%{z:.4~r}" if trace.text is None else "%{text}"
-        return {"hovertemplate": f"{x}, {y}<br>{value} {trace.colorbar.title.text}{name}"}
-    return {"hovertemplate": f"{y}{name}" if is_unified else f"{x}, {y}{name}"}
 
 
 def make_grid(
@@ -352,6 +335,7 @@ def make_grid(
     figure.update_layout(
         width=WIDTH, height=INCH * height, margin=MARGIN, barmode="overlay", bargap=0
     )
+    figure.update_xaxes(hoverformat=".6~g").update_yaxes(hoverformat=".4~r")
     grid = np.empty((rows, columns), object)
     for row, column in itertools.product(range(rows), range(columns)):
         if specs[row][column] is None:

@@ -11,7 +11,6 @@ from compressor.analysis import (
     SPOKEN,
     Cycle,
     case_of,
-    describe_cases,
     end_states,
     frame_forces,
     impacts,
@@ -290,8 +289,6 @@ def draw_cards(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
         (f"indicated power, {end} end", spell(1e-3 * gas.work / seconds, "kW"))
         for end, gas in end_states(revolution).items()
     ]
-    machine = dict(describe_cases([case_of(run)]).lines())
-    numbers.append(("the cylinder without clearance", machine["cylinder"]))
     sentence = (
         "Pressure of the gas over its volume and over crank angle, in the last settled revolution, "
         "as it presses on the piston."

@@ -267,7 +267,7 @@ class Figure {
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       font: { family: "system-ui, sans-serif", size: 12, color: ink },
       modebar: { bgcolor: "rgba(0,0,0,0)", color: faint, activecolor: ink },
-      hoverlabel: { bgcolor: paper, font: { color: ink } },
+      hoverlabel: { bgcolor: paper, font: { color: ink }, namelength: -1 },
       template: { layout: { xaxis: axis, yaxis: axis } } } };
   }
 
