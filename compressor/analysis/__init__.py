@@ -32,7 +32,6 @@ from compressor.analysis.shaking import (
     frame_forces,
     healthy_twin,
     last_revolution,
-    sensor_envelope,
     shaking,
 )
 from compressor.analysis.wear import interpolate_hours, rubbing_work

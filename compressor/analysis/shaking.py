@@ -95,9 +95,6 @@ def healthy_twin(run: "xr.Dataset") -> "xr.Dataset | None":
 
 
 ORDER = 12  # of the crank speed: above it the ideal machine's force has next to nothing
-LEVELS = 5  # of the kurtogram that chooses a sensor's band, at most
-MIN_SHARE = 0.01  # of the record's energy that this band has
-MIN_LINES = 128  # samples that a level of it needs, twice over for each further one
 
 
 @dataclass(frozen=True)
@@ -143,42 +140,3 @@ def evenly(settled: "xr.Dataset", revolutions: int, values: np.ndarray) -> tuple
     if not a_turn:
         raise NoSeriesError("the run has no two samples a revolution (solve.output_step_deg)")
     return resample_angle(crank, values, a_turn)[: revolutions * a_turn], a_turn
-
-
-@dataclass(frozen=True)
-class SensorEnvelope:
-    """The envelope spectrum of a sensor's record: orders and amplitudes (m/s2), (k,) each.
-
-    `band`: in Hz, the one with the greatest `kurtosis` of those bands of the kurtogram that hold
-    `MIN_SHARE`; beyond the sensor's filter there is rounding alone.
-    """
-
-    orders: np.ndarray
-    amplitudes: np.ndarray
-    band: tuple[float, float]
-    kurtosis: float
-
-
-def sensor_envelope(run: "xr.Dataset") -> SensorEnvelope | None:
-    """Return the envelope spectrum of a run's sensor; None without, or of too short a record."""
-    from compressor.vibration import envelope_spectrum, kurtogram, line_amplitudes
-
-    if "sensor_acceleration" not in run:
-        return None
-    values, time = run["sensor_acceleration"].values, run["sensor_time"].values
-    if values.size < 4 * MIN_LINES or not np.isfinite(values).all() or not np.ptp(values):
-        return None
-    rate = (time.size - 1) / (time[-1] - time[0])
-    levels = min(LEVELS, int(math.log2(values.size // MIN_LINES)))
-    centre, width, kurtosis = kurtogram(values, rate, levels)
-    power = line_amplitudes(values, values.size, True) ** 2
-    lines = np.arange(power.size) * rate / values.size
-    edges = centre - width / 2, centre + width / 2
-    cumulative = np.append(0.0, np.cumsum(power))
-    low, high = (np.searchsorted(lines, edge) for edge in edges)
-    strong = cumulative[high] - cumulative[low] >= MIN_SHARE * power.sum()
-    best = int(np.nanargmax(np.where(strong, kurtosis, np.nan)))
-    band = float(edges[0][best]), float(edges[1][best])
-    speed = 1.0 / case_of(run).turn
-    orders, amplitudes = envelope_spectrum(values, rate, band, speed=speed)
-    return SensorEnvelope(orders, amplitudes, band, float(kurtosis[best]))

@@ -10,7 +10,6 @@ from compressor.vibration.spectra import (
     energy_angle,
     envelope_spectrum,
     high_pass_orders,
-    kurtogram,
     line_amplitudes,
     resample_angle,
     shape,

@@ -13,16 +13,12 @@ take them as periodic. All raise RecordError for one that is not finite.
 import math
 
 import numpy as np
-from scipy.fft import ifft, irfft, rfft
+from scipy.fft import irfft, rfft
 from scipy.interpolate import CubicSpline
 
 from compressor.program import CompsimError
 
 SAME_ANGLE = 1e-9  # share of an interval of angle: nearer ones are the same
-MIN_BAND = 64  # lines in the narrowest band, and so independent samples of its envelope
-BAND_EDGE = 0.25  # of a band's width: how far its gain falls off on either side of its edge
-ENDS = 4  # samples of an envelope left out at either end, where it feels a jump from end to start
-SILENT_SHARE = 1e-10  # share of the signal's rms: a band below it holds rounding
 
 
 class RecordError(CompsimError):
@@ -125,56 +121,6 @@ def envelope_spectrum(
     envelope = np.abs(hilbert(band_signal(values, rate, low, high)))
     amplitudes = line_amplitudes(envelope, envelope.size, rms=False)
     return np.arange(amplitudes.size) * (rate / envelope.size / speed), amplitudes
-
-
-def kurtogram(values: np.ndarray, rate: float, levels: int) -> tuple[np.ndarray, ...]:
-    """Return the spectral kurtosis over the bands of a 1/3-binary tree.
-
-    Centres and widths, in the unit of the rate, and kurtosis of n bands, widest first, (n,) each:
-    0 of stationary Gaussian noise, -1 of a sine, positive of impulses, nan of a band 200 dB below
-    the signal. values: (m,) at a rate of samples a second, or a revolution.
-
-    The range from 0 to rate / 2 is divided by 1, 2, 3, 4, 6, 8, 12, ... 2^levels, as by Antoni's
-    fast kurtogram (Mechanical Systems and Signal Processing 21, 2007). The kurtosis is
-    <|c|^4> / <|c|^2>^2 - 2 of the complex envelope c of a band. Each envelope comes from its lines
-    in the spectrum, with a gain that falls off as a cosine over a quarter of the width beyond and
-    within each edge; neighbours share the power. The mean is taken off first. Of noise alone it
-    scatters by 1.7 over the root of a band's lines, and is at most 2.5 to 4.5 times that over 220
-    bands, of 6 levels, in 80 % of records.
-
-    Large slow motion reaches into the lowest bands alone, but a jump from the end to the start
-    of a signal that is not periodic is an impulse; the samples about it are left out. Raises
-    RecordError if the narrowest band has less than `MIN_BAND` lines, or the signal is constant.
-    """
-    found = check_signal(values)
-    half = found.size // 2
-    if half < MIN_BAND * 2**levels:
-        need = f"{levels} levels need {2 * MIN_BAND * 2**levels} samples, and there are"
-        raise RecordError(f"{need} {found.size}: choose fewer levels, or pass a longer signal")
-    if np.ptp(found) == 0.0:
-        raise RecordError("the signal is constant, so that it has no kurtosis: pass another one")
-    lines = rfft(found - found.mean())[: half + 1]
-    parts = sorted({2**n for n in range(levels + 1)} | {3 * 2**n for n in range(levels - 1)})
-    kurtosis = np.concatenate([_kurtosis_of_parts(lines, n) for n in parts])
-    width = np.repeat(rate / 2 / np.array(parts), parts)
-    centre = (np.concatenate([np.arange(n) for n in parts]) + 0.5) * width
-    return centre, width, kurtosis
-
-
-def _kurtosis_of_parts(lines: np.ndarray, parts: int) -> np.ndarray:
-    """Return the kurtosis of as many equal bands, (parts,); lines: of the spectrum, (k,)."""
-    width = (lines.size - 1) / parts
-    reach = math.ceil(width * (0.5 + BAND_EDGE)) + 1
-    centre = ((np.arange(parts) + 0.5) * width)[:, None]
-    index = np.floor(centre).astype(int) + np.arange(-reach, reach)
-    past = np.clip((np.abs(index - centre) / width - 0.5) / BAND_EDGE, -1.0, 1.0)  # 0 at an edge
-    gain = np.cos((past + 1.0) * (math.pi / 4))
-    gain[(index < 0) | (index >= lines.size)] = 0.0
-    envelope = ifft(np.pad(lines, reach)[index + reach] * gain, axis=1)[:, ENDS:-ENDS]
-    power = np.abs(envelope) ** 2
-    mean, fourth = np.mean(power, axis=1), np.mean(power**2, axis=1)
-    silent = mean <= SILENT_SHARE**2 * np.sum(np.abs(lines) ** 2) / index.shape[1] ** 2
-    return np.where(silent, np.nan, fourth / np.where(silent, 1.0, mean**2) - 2.0)
 
 
 def shape(values: np.ndarray) -> tuple[float, float, float, float]:

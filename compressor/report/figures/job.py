@@ -18,7 +18,6 @@ from compressor.analysis import (
     last_revolution,
     read_cycle,
     read_loads,
-    sensor_envelope,
     settled_revolutions,
     shaking,
 )
@@ -69,7 +68,6 @@ OPEN = LineStyle(BLACK, (), 4.0)
 BEGINS = ("opens", "begins")  # words of events; the others end what has begun
 NAMES = {"this": "this job", "twin": "the same machine without clearance"}
 MAX_ORDERS = 200  # that are drawn
-MAX_ENVELOPE = 60  # of an envelope
 DECADES = 4  # below the greatest line
 ORDERS_AXIS = "order (cycles per revolution)"
 
@@ -117,6 +115,9 @@ def draw_analyst(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     if twin is not None:
         peak, _ = loudest(read_cycle(twin))
         numbers.insert(2, ("greatest without clearance", spell(peak, "m/s²")))
+    clipped = float(run.get("clipped_fraction", 0.0))
+    if clipped >= Sensor.REPORTED:
+        numbers.append(("record", CLIPPED.format(share=f"{100.0 * clipped:.3g}")))
     return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)
 
 
@@ -296,34 +297,25 @@ def draw_cards(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
     return DrawnFigure(drawing.figure(), sentence + caution(run), numbers)
 
 
-@figure("job", "spectra", "order spectra")
+@figure("job", "spectra", "order spectrum of the force on the frame along the cylinder")
 def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
-    """Return the order spectra of X and of a sensor's envelope."""
-    envelope = sensor_envelope(run)
-    rows = 1 if envelope is None else 2
-    drawing, panels = make_grid(rows, 1, 2.7 * rows + 0.5, units=units)
-    force = panels[0, 0]
-    force.label("y", "amplitude of X ({})", "N")
-    plot_lines(force, shaking(run).amplitudes, THIS, NAMES["this"])
-    if twin is not None:
-        plot_lines(force, shaking(twin).amplitudes, TWIN, NAMES["twin"])
-    force.title = "force on the frame along the cylinder"
-    if envelope is not None:
-        plot_envelope(panels[1, 0], (envelope.orders, envelope.amplitudes), envelope.band)
-    for panel in panels.flat:
-        panel.x.title = ORDERS_AXIS
-    above = [(f"rms of X above order {ORDER}", spell(shaking(run).above, "N"))]
-    if twin is not None:
-        above.append(("without clearance", spell(shaking(twin).above, "N")))
-    if envelope is not None:
-        low, high = (f"{edge:.0f}" for edge in envelope.band)
-        label = f"spectral kurtosis of the band from {low} to {high} Hz"
-        above.append((label, spell(envelope.kurtosis)))
-    clipped = float(run.get("clipped_fraction", 0.0))
-    if clipped >= Sensor.REPORTED:
-        above.append(("record", CLIPPED.format(share=f"{100.0 * clipped:.3g}")))
+    """Return the order spectrum of X."""
+    drawing, panels = make_grid(1, 1, 3.2, units=units)
+    (panel,) = panels.flat
+    panel.label("y", "amplitude of X ({})", "N")
+    numbers = []
+    both = (
+        (run, THIS, "this", f"rms of X above order {ORDER}"),
+        (twin, TWIN, "twin", "without clearance"),
+    )
+    for one, line, name, label in both:
+        if one is not None:
+            found = shaking(one)
+            plot_lines(panel, found.amplitudes, line, NAMES[name])
+            numbers.append((label, spell(found.above, "N")))
+    panel.x.title = ORDERS_AXIS
     sentence = "Peak amplitudes over the settled revolutions."
-    return DrawnFigure(drawing.figure(), sentence + caution(run), above)
+    return DrawnFigure(drawing.figure(), sentence + caution(run), numbers)
 
 
 def plot_lines(panel: Panel, amplitudes: np.ndarray, line: LineStyle, name: str) -> None:
@@ -340,19 +332,6 @@ def plot_lines(panel: Panel, amplitudes: np.ndarray, line: LineStyle, name: str)
     if not panel.rules:
         panel.rule(MARK, x=ORDER)
         panel.write(f"order {ORDER}", ORDER, 1, RED, "y", (4, -4), level="top", size=8.5)
-
-
-def plot_envelope(
-    panel: Panel, lines: tuple[np.ndarray, np.ndarray], band: tuple[float, float]
-) -> None:
-    """Draw a sensor's envelope spectrum, orders and amplitudes (k,), without mean; band in Hz."""
-    shown = (lines[0] > 0.01) & (lines[0] <= MAX_ENVELOPE)
-    panel.label("y", "amplitude ({})", "m/s²")
-    panel.plot(lines[0][shown], lines[1][shown], THIS, NAMES["this"])
-    low, high = (edge / 1e3 for edge in band)
-    panel.title = f"envelope of the sensor between {low:.3g} and {high:.3g} kHz"
-    panel.span("y", low=0)
-    panel.span("x", 0, MAX_ENVELOPE)
 
 
 @figure("job", "orbits", "orbits of the journals", "clearance")
