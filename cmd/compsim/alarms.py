@@ -39,9 +39,6 @@ def read_bands(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) ->
     "--false-alarms", type=RATE, default=0.01, help="Set limits for this rate of false alarms."
 )
 @click.option(
-    "--detected", type=RATE, default=0.9, help="Call a clearance detected at this share of windows."
-)
-@click.option(
     "--band",
     "bands",
     multiple=True,

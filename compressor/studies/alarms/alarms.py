@@ -46,6 +46,7 @@ from compressor.vibration import RecordError
 SOUND = "none"  # the joint that is worn in a sound machine
 MIN_SOUND = 10  # draws of a sound machine: by fewer of them no limit means anything
 NO_DRAW = ("joint", "clearance_mm", "sensor", "healthy_clearance_mm")  # groups that make no draw
+DETECTED = 0.9  # share of windows from which on an alarm is said to detect
 FOLDS, SEED = 5, 1
 MAX_LEVELS, BINS = 12, 6  # clearances of a joint, beyond which they are put together in groups
 Z = NormalDist().inv_cdf(0.975)  # of intervals of 95 %
@@ -179,15 +180,15 @@ def compute_rate(trips: np.ndarray, draws: np.ndarray) -> tuple[float, float, fl
     return share, max(low, 0.0), min(high, 1.0)
 
 
-def find_onset(clearances: np.ndarray, rates: np.ndarray, least: float) -> list[float]:
-    """Return the least of rising clearances from which on a rate is `least` or more, or inf.
+def find_onset(clearances: np.ndarray, rates: np.ndarray) -> list[float]:
+    """Return the least of rising clearances from which on a rate is `DETECTED` or more, or inf.
 
     With its interval. rates: (n, 3), by `ENDS`: the interval goes from where their upper ends are
     so on, to where their lower ends are.
     """
     found = []
     for column in (0, 2, 1):
-        missed = np.flatnonzero(rates[:, column] < least)
+        missed = np.flatnonzero(rates[:, column] < DETECTED)
         begin = missed[-1] + 1 if missed.size else 0
         found.append(float(clearances[begin]) if begin < len(clearances) else math.inf)
     return found
@@ -208,14 +209,13 @@ def list_states(windows: Windows) -> Iterator[tuple[str, np.ndarray]]:
 
 def judge_alarms(
     folder: Folder, study: str, bands: Sequence[Band] = (), noise: Sequence[float] = (0.0,),
-    revolutions: int = 5, false_alarms: float = 0.01, detected: float = 0.9,
-    progress: Progress = no_progress,
+    revolutions: int = 5, false_alarms: float = 0.01, progress: Progress = no_progress,
 ) -> xr.Dataset:  # fmt: skip
     """Return how often each alarm trips in each state of a stored study, and how often falsely.
 
     bands: of the filters, Hz, none for `default_bands`; noise: rms values (m/s2) of white noise
     that is added to records; revolutions: of a window; false_alarms: the rate that limits are set
-    for; detected: the share of windows from which on an alarm is said to detect.
+    for.
 
     Dimensions: `alarm` (with its filter), `noise`, `state` (a worn joint and a clearance), `joint`,
     `end` (a value and its 95 % interval by draws, for limits as they were set). Variables: `limit`,
@@ -227,9 +227,9 @@ def judge_alarms(
     check_draws(source, windows)
     sound = windows.joints == SOUND
     draws = len({*windows.draws[sound].tolist()})
-    return judge_windows(windows, noise, false_alarms, detected).assign_attrs(
+    return judge_windows(windows, noise, false_alarms).assign_attrs(
         title=f"compsim: alarms of {source.name}", study=source.name, case_file=source.case_file,
-        revolutions=revolutions, detected=detected, wanted=false_alarms, sound_draws=draws,
+        revolutions=revolutions, detected=DETECTED, wanted=false_alarms, sound_draws=draws,
         rate=max(false_alarms, 1.0 / (draws + 1)), clipped=windows.clipped,
         sound_jobs=len({*windows.keys[sound].tolist()}), left_out=json.dumps(+left),
         worn_jobs=len({*windows.keys[~sound].tolist()}),
@@ -244,9 +244,7 @@ RATES = {  # name -> dims beside alarm and noise, unit, long name
 }
 
 
-def judge_windows(
-    windows: Windows, noise: Sequence[float], false_alarms: float, detected: float
-) -> xr.Dataset:
+def judge_windows(windows: Windows, noise: Sequence[float], false_alarms: float) -> xr.Dataset:
     """Return the `RATES` of all alarms whose reading all sound windows have."""
     sound, draws, readings = windows.joints == SOUND, windows.draws, windows.readings
     states = [*list_states(windows)]
@@ -269,7 +267,7 @@ def judge_windows(
         for k in range(FOLDS):
             trips[fold == k] = trip(alarm, own, sound & (fold != k))[1][fold == k]
         false = compute_rate(trips[sound], draws[sound])
-        first = [find_onset(middle[at], rates[at], detected) for at in of_joint.values()]
+        first = [find_onset(middle[at], rates[at]) for at in of_joint.values()]
         return dict(zip(RATES, (limit, rates, false, first), strict=True))
 
     def is_judged(alarm: Alarm, name: str) -> bool:
@@ -413,7 +411,7 @@ def list_numbers(found: xr.Dataset) -> list[str]:
         f"worn machines: {attrs['worn_jobs']} jobs",
         f"windows: {attrs['revolutions']} revolutions",
         f"limits: for {100 * attrs['rate']:.2g} % of false alarms",
-        f"detects: trips in {attrs['detected']:.0%} of windows, from that clearance on",
+        f"detects: trips in {DETECTED:.0%} of windows, from that clearance on",
     ]
 
 
@@ -430,7 +428,7 @@ def list_warnings(found: xr.Dataset) -> Iterator[str]:
     absent = [one.title for one in ALARMS if one.title not in found["kind"].values]
     if absent:
         yield f"not judged, since not all sound records have it: {', '.join(absent)}"
-    needed = math.ceil(Z**2 * attrs["detected"] / max(1.0 - attrs["detected"], 1e-9))
+    needed = math.ceil(Z**2 * DETECTED / (1.0 - DETECTED))
     if (few := int(found["draws"].min())) < needed:
         yield f"a clearance has {few} draws: to be sure that it is detected takes {needed}"
 
@@ -463,7 +461,7 @@ def draw_alarms(found: xr.Dataset, title: str = "") -> PlotlyFigure:
             shares = mine["detection"].isel(alarm=best[joint][kind]).sel(end="value").values
             look = replace(line, marker="circle", markersize=3.5)
             panel.plot(mine["clearance"].values, shares, look, kind)
-        panel.rule(style.LineStyle(style.GREY, (3.7, 1.6), 0.8), y=found.attrs["detected"])
+        panel.rule(style.LineStyle(style.GREY, (3.7, 1.6), 0.8), y=DETECTED)
         panel.title = f"({'abc'[joints.index(joint)]}) {joint.replace('_', ' ')}"
         panel.x.title = "clearance (mm)"
         panel.span("y", -0.02, 1.04)

@@ -98,7 +98,6 @@ def test_mistakes_are_named(worn_store, worn, compsim, tmp_path):
         (worn_store, ["worn", "--band", "high"], "'high' is no band such as 1000-3000, in Hz"),
         (worn_store, ["worn", "--band", "9-3"], "'9-3' is no band such as 1000-3000, in Hz"),
         (worn_store, ["worn", "--false-alarms", "7"], "7.0 is not in the range 0.0<x<1.0"),
-        (worn_store, ["worn", "--detected", "-1"], "-1.0 is not in the range 0.0<x<1.0"),
         (worn_store, ["worn", "--revolutions", "1"], "1 is not in the range x>=2"),
         (worn_store, ["worn", "--noise", "1,1"], "a noise level is given twice"),
         (worn_store, ["worn", "--wear", str(tmp_path)], "has 0 wear runs: compsim wear"),

@@ -58,7 +58,7 @@ def test_the_clearance_from_which_on_is_in_its_interval():
     held = 0
     for _ in range(300):
         rates = [compute_rate((rng.random(40) < one).astype(float), names(40)) for one in truth]
-        found = find_onset(np.array(clearances), np.array(rates), 0.9)
+        found = find_onset(np.array(clearances), np.array(rates))
         assert found[1] <= found[0] <= found[2]
         held += found[1] <= 0.3 <= found[2]
     assert held / 300 > 0.94
@@ -69,7 +69,7 @@ def test_a_clearance_counts_from_which_on_it_holds():
 
     def onset(*shares):
         rates = np.array([(share, share - 0.1, min(share + 0.1, 1.0)) for share in shares])
-        return find_onset(np.arange(1.0, len(shares) + 1.0), rates, 0.9)
+        return find_onset(np.arange(1.0, len(shares) + 1.0), rates)
 
     assert onset(0.95, 0.7, 0.92, 1.0) == [3, 3, 4]
     assert onset(0.1, 0.2, 0.85) == [math.inf, 3, math.inf]

@@ -46,13 +46,9 @@ def made_windows(sound=20, draws=10, every_second=0.3, worn="draw"):
     return Windows(np.array(joints), np.array(clearances), draws, draws, {(0, RECORD): readings}, 0)
 
 
-def judge(windows, noise=(0.0,), detected=0.9):
-    return judge_windows(windows, noise, 0.05, detected)
-
-
 @pytest.fixture(scope="module")
 def judged():
-    return judge(made_windows())
+    return judge_windows(made_windows(), (0.0,), 0.05)
 
 
 def test_rates_of_made_up_windows_are_known(judged):

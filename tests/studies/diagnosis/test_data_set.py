@@ -4,10 +4,16 @@ import json
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from compressor.cases.case import Case
 from compressor.store.reader import read_store
-from compressor.studies.diagnosis.dataset import make_data_set, name_machine, split_by_machine
+from compressor.studies.diagnosis.dataset import (
+    list_warnings,
+    make_data_set,
+    name_machine,
+    split_by_machine,
+)
 from compressor.studies.diagnosis.features import features
 from compressor.studies.frame import StudyError, cut_windows
 from compressor.vibration import Record
@@ -121,3 +127,29 @@ def test_jobs_that_are_not_run_are_counted(worn, tmp_path):
     (tmp_path / "studies").symlink_to(worn / "studies")
     with pytest.raises(StudyError, match="has no record of 5 revolutions: 14 missing"):
         make_data_set(tmp_path, "worn")
+
+
+def test_what_spoils_a_score_is_warned_of(made):
+    warnings = [*list_warnings(made)]
+    assert warnings[0] == "too few machines to test on: both, none"
+    assert "sound joints are ideal" in warnings[1]
+    clipped = [*list_warnings(made.assign_attrs(clipped_records=3, clipped_most=0.25))]
+    assert clipped[0].startswith("3 records are clipped at sensor.range_m_per_s2, at worst 25 %")
+    fixed = json.loads(made.attrs["fixed"]) | {"healthy_clearance_mm": {"big_end": 0.1}}
+    assert len([*list_warnings(made.assign_attrs(fixed=json.dumps(fixed)))]) == 1
+
+
+def test_the_command(made, worn, tmp_path, compsim):
+    place = tmp_path / "inner" / "faults"
+    out, err = compsim("dataset", "worn", "-r", str(worn), "-o", str(place))
+    assert "big_end  train         2        8\n" in out
+    assert "warning: too few machines to test on: both, none\n" in err
+    assert "left out: 2 budget_steps\n" in out
+    assert f"{place}/windows.nc" in out
+    with xr.open_dataset(place / "windows.nc", engine="h5netcdf") as found:
+        assert found["signal"].attrs["units"] == "m/s2"
+        assert found.attrs["comment"].startswith("Everything is simulated")
+        assert found.attrs["program"].startswith("compsim ")
+        for name in made.variables:
+            there, here = found[name].values, made[name].values
+            assert np.array_equal(there, here, equal_nan=here.dtype.kind == "f"), name
