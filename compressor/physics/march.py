@@ -32,7 +32,7 @@ from compressor.physics.onset import (
     shift_of_change,
     store_approach_velocity,
 )
-from compressor.physics.record import CHOSEN_FORCES, MECHANISM, zero
+from compressor.physics.record import CHOSEN_FORCES, zero
 from compressor.physics.runge_kutta import (
     FLOWS,
     STAGES,
@@ -102,19 +102,6 @@ class Status(IntEnum):
 RUNNING, DONE, NON_FINITE, STEP_UNDERFLOW, PENETRATION_IMPLAUSIBLE, BEYOND_MODEL = map(int, Status)
 
 
-class Attempt(IntEnum):
-    """What became of an attempt of a step; by the stiff partner STIFF more."""
-
-    REFUSED = 0
-    TAKEN = 1
-    TO_ONSET = 2
-    CUT_AT_ONSET = 3
-    STIFF = 4
-
-
-REFUSED, TAKEN, TO_ONSET, CUT_AT_ONSET, STIFF = map(int, Attempt)
-LAST_STEPS = 16  # attempts that are kept for whoever asks why a run stopped
-
 STEPPER = np.dtype(
     [
         ("status", "i8"),
@@ -133,7 +120,6 @@ STEPPER = np.dtype(
         ("evaluations", "i8"),
         ("rejected", "i8"),
         ("onsets", "i8"),  # that steps have ended on
-        ("attempts", "i8"),  # of a step: taken, refused, and cut short by an onset
         ("mode", "i8"),  # Mode
         ("stiff", "i8"),  # whether the present step is the stiff partner's
         ("stability_limited", "i8"),  # explicit steps in a row that stability has held
@@ -165,7 +151,6 @@ class WorkArrays(NamedTuple):
     # (4,): share of the step with the rod load above and below zero, its tension and compression
     sides: np.ndarray
     row: np.ndarray
-    last: np.ndarray  # (LAST_STEPS, 4): the last attempts in a ring: begin, length, error, Attempt
 
 
 def new_stepper(mode):
@@ -185,7 +170,7 @@ def new_work(n):
     return WorkArrays(
         np.zeros((STAGES, size)), np.zeros(size), np.zeros(size), np.zeros((size, n)),
         np.zeros((5, n)), np.zeros(STAGES), np.zeros(n), np.zeros((NODES.size, COLUMNS)),
-        np.zeros(2), np.zeros(4), np.zeros(COLUMNS), np.zeros((LAST_STEPS, 4)),
+        np.zeros(2), np.zeros(4), np.zeros(COLUMNS),
     )  # fmt: skip
 
 
@@ -453,32 +438,6 @@ def keep_velocities(w, t, work, phase, p, tally):
 store_velocities = dispatch_on_record(CHOSEN_FORCES, store_approach_velocity, keep_velocities)
 
 
-@inline_llvm
-def pass_with_crank(t, z, p):
-    """Return the time (s) that has passed when a crank is where a steady one were at t."""
-    return t + z[p.at[0] - 1] if p.driven else t
-
-
-@inline_llvm
-def pass_steadily(t, z, p):
-    """Return t: a steady crank's time is the time that passes."""
-    return t
-
-
-# of rates in place of z, and 1 in place of t: how fast time passes
-pass_time = dispatch_on_record(MECHANISM, pass_with_crank, pass_steadily)
-
-
-@inline_llvm
-def begin_attempt(w, h, z, error, work, p):
-    """Write an attempt of a step, REFUSED as long as nothing else is known, and return its row."""
-    row = work.last[w.attempts % LAST_STEPS]
-    row[0], row[1] = pass_time(w.t, z, p), h * pass_time(1.0, work.k[0], p)
-    row[2], row[3] = error, REFUSED + STIFF * w.stiff
-    w.attempts += 1
-    return row
-
-
 @inner
 def is_finite(new):
     """Return whether every number of a state is finite."""
@@ -529,7 +488,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         without_refcount(work.jacobian), without_refcount(work.dense),
         without_refcount(work.weights), without_refcount(work.y), without_refcount(work.rows),
         without_refcount(work.gap_fraction), without_refcount(work.sides),
-        without_refcount(work.row), without_refcount(work.last),
+        without_refcount(work.row),
     )  # fmt: skip
     z, atol, size = without_refcount(z), without_refcount(atol), without_refcount(size)
     times, states = without_refcount(times), without_refcount(states)
@@ -553,7 +512,6 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
             h = w.landing
         base = crank_direction(w.t, p)
         error = try_step(w, base, h, z, work, atol, size, phase, p)
-        attempt = begin_attempt(w, h, z, error, work, p)
         if not landing:
             if not error <= 1.0:  # nan is refused
                 refuse(w, h, error)
@@ -564,13 +522,11 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
             # a step that the segment's end cut short says nothing against longer ones
             w.h = max(w.h, next_h) if h < w.h else next_h
         stride = observe_step(w, base, h, z, work, phase, p, tally)
-        attempt[3] += TO_ONSET if landing else TAKEN
         met = False  # whether joints carry new speeds
         if landing:
             w.landing, w.landed, w.onsets = 0.0, 1, w.onsets + 1
             met = store_velocities(w, w.t + h, work, phase, p, tally)
         elif onset_ahead(w, h, work, phase, p):
-            attempt[3] += CUT_AT_ONSET - TAKEN
             continue
         at_edge = not landing and h == end - w.t
         reached = end if at_edge else w.t + h

@@ -1,7 +1,7 @@
 """What an integration takes and gives, why it stops, and its tally by revolutions."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -59,9 +59,7 @@ class Trajectory:
     """States on the output grid, the tally of the dense solution, and how the run ended.
 
     `states` is nan from the sample at which a run stopped; `phases`: of the load, by sample;
-    `turns`: tallies between cuts; `turn_states`: the motion at each; `last_steps`: of attempts:
-    begin and length (s), error over its tolerance, nan where that is not known, and what became of
-    it.
+    `turns`: tallies between cuts; `turn_states`: the motion at each.
     """
 
     times: np.ndarray
@@ -72,7 +70,6 @@ class Trajectory:
     detail: str = ""
     stop_time: float = math.nan
     stop_state: np.ndarray = field(default_factory=lambda: np.empty(0))
-    last_steps: Iterable[tuple[float, float, float, str]] = ()
     edges: np.ndarray = field(default_factory=lambda: np.empty(0))  # of segments, s, with cuts
     edge_phases: np.ndarray = field(default_factory=lambda: np.empty(0))  # as run through
     turns: list[np.record] = field(default_factory=list)

@@ -15,12 +15,9 @@ from compressor.cases import Case
 from compressor.physics import (
     COLUMNS,
     FLOWS,
-    LAST_STEPS,
-    Attempt,
     Load,
     Mode,
     Status,
-    WorkArrays,
     march,
     merge_tallies,
     new_stepper,
@@ -132,25 +129,7 @@ def march_through(
             check_march(request, stepper, z, result.tally.deepest, deadline)
         except Stop:
             result.stop_time, result.stop_state = float(stepper.t), z[:-FLOWS].copy()
-            result.last_steps = read_last_steps(stepper, work)
             raise
-
-
-WORDS = {
-    Attempt.REFUSED: "refused", Attempt.TAKEN: "taken", Attempt.TO_ONSET: "to an onset",
-    Attempt.CUT_AT_ONSET: "cut at an onset",
-}  # fmt: skip
-
-
-def read_last_steps(stepper: np.record, work: WorkArrays) -> list[tuple[float, float, float, str]]:
-    """Return the last attempts of a march, by its ring of them."""
-    found, attempts = [], int(stepper.attempts)
-    for number in range(max(0, attempts - LAST_STEPS), attempts):
-        begin, length, error, code = work.last[number % LAST_STEPS].tolist()
-        name = "RODAS" if code >= Attempt.STIFF else "TSIT5"
-        words = f"{name} {WORDS[Attempt(int(code) % Attempt.STIFF)]}"
-        found.append((begin, length, error, words))
-    return found
 
 
 def check_march(

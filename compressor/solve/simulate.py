@@ -165,18 +165,13 @@ def stop_time(p: np.record, run: Trajectory) -> float:
 
 
 def stop_attributes(case: Case, solution: Solution) -> dict[str, object]:
-    """Return where a run stopped, in which state, and how its last steps went."""
+    """Return where a run stopped, and in which state."""
     trajectory = solution.trajectory
-    last = trajectory.last_steps
     return {
         "stop_time": stop_time(solution.p, trajectory),
         "stop_crank_angle": case.omega * trajectory.stop_time,
         "stop_state": trajectory.stop_state,
         "stop_state_names": "; ".join(state_names(solution.p)),
-        "stop_history_time": np.array([time for time, *_ in last]),
-        "stop_history_step": np.array([length for _, length, *_ in last]),
-        "stop_history_error": np.array([error for *_, error, _ in last]),
-        "stop_history_words": "; ".join(words for *_, words in last),
     }
 
 
