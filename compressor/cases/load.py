@@ -6,10 +6,10 @@ whole, for its key and for what is wrong with its values, and again when it is u
 """
 
 import itertools
-import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal
 from typing import Any
 
 from compressor.cases.case import Case
@@ -232,7 +232,7 @@ def _blocks(file: CaseFile, max_jobs: int) -> list[Block]:
     for block in blocks:
         repeated = [one for one in block.find_repeated() if one.key not in told]
         problems += repeated
-        if math.prod(block.sizes().values()) and not (repeated or block.numbers):
+        if block.combinations and not (repeated or block.numbers):
             problems.append(block.tree.problem(("exclude",), "leaves no job"))
     if not problems and not file.problems:
         return blocks
@@ -277,23 +277,14 @@ def _block_trees(tree: Tree, changes: Tree, max_jobs: int) -> tuple[list[Tree], 
 
 def _find_too_many(blocks: Sequence[Block], max_jobs: int) -> FileProblem | None:
     """Return the problem of more jobs than may be made."""
-    sizes = [block.sizes() for block in blocks]
-    total = sum(math.prod(one.values()) for one in sizes)
+    total = sum(block.combinations for block in blocks)
     if total <= max_jobs:
         return None
-    largest = max(blocks, key=lambda block: math.prod(block.sizes().values()))
+    largest = max(blocks, key=lambda block: block.combinations)
     key = max(largest.factors, key=largest.size)[0]
-    counts = [" x ".join(f"{name} ({format_count(n)})" for name, n in one.items()) for one in sizes]
-    message = (
-        f"{format_count(total)} jobs are more than {max_jobs}: {shorten(' + '.join(counts), 300)}; "
-        "ask for fewer, or raise --max-jobs"
-    )
+    many = Decimal(total)  # which may be beyond any float
+    message = f"{many:.20g} jobs are more than {max_jobs}: ask for fewer, or raise --max-jobs"
     return FileProblem(largest.tree.at(*largest.sweeps[key].path)[1], key, message)
-
-
-def format_count(count: int) -> str:
-    """Return a number of jobs as messages write it, however large."""
-    return str(count) if count < 10**100 else f"over 10^{int(count.bit_length() * 0.30103) - 1}"
 
 
 def _columns(blocks: Sequence[Block]) -> list[str]:

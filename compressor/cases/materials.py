@@ -1,7 +1,6 @@
 """Materials of the paper, the contact stiffness that follows from them, and its pin's numbers."""
 
 import math
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from compressor.cases.checks import row_of
@@ -85,8 +84,12 @@ def paper_notes(case: "Case") -> dict[str, str]:
     radius = table()["machine.pin_radius_mm.big_end"].default
     others = {joint: pin for joint, pin in pins.items() if pin != radius}
     key = "contact.stiffness_N_per_mm15"
-    if contact.stiffness_N_per_mm15 == table()[key].default and contact.law not in CYLINDRICAL:
-        found[key] = _tell_stiffness(case, others, radius)
+    is_papers = contact.stiffness_N_per_mm15 == table()[key].default
+    if others and is_papers and contact.law not in CYLINDRICAL:
+        found[key] = (
+            f"{contact.stiffness_N_per_mm15:g} N/mm^1.5 is the paper's, of a pin of {radius:g} mm "
+            "radius: give contact.materials, such as [steel, steel], or the stiffness"
+        )
     if film:
         why = "a film bears about as the cube of it"
         lengths["lubricant.bearing_length_mm"] = film.bearing_length_mm.at, why
@@ -103,22 +106,3 @@ def paper_notes(case: "Case") -> dict[str, str]:
             f"has {given} mm: {why}; give the length that bears, without grooves and holes"
         )
     return {key: note for key, note in found.items() if note}
-
-
-def _tell_stiffness(case: "Case", pins: Mapping[str, float], radius: float) -> str:
-    """Return Eq. 15's stiffness for pins (mm) by joint, beside the paper's; "" without any."""
-    gaps = {pin: getattr(case.clearance_mm, joint) for joint, pin in pins.items()}
-    texts = []
-    for pin, clearance in gaps.items():
-        radii = to_si(pin, "mm"), to_si(pin + clearance, "mm")
-        inside, outside = (
-            contact_stiffness("steel", "steel", *radii, internal=internal) / 1000.0**1.5
-            for internal in (True, False)
-        )
-        text = f"{inside:.3g} for one of {pin:g} mm in its bore ({outside:.3g} as of two discs)"
-        texts.append(text)
-    return bool(texts) * (
-        f"{case.contact.stiffness_N_per_mm15:g} N/mm^1.5 is the paper's, of a pin of {radius:g} mm "
-        f"radius; of steel on steel Eq. 15 gives {' and '.join(texts)}: give contact.materials, "
-        "such as [steel, steel], or the stiffness"
-    )

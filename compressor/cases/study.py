@@ -70,9 +70,10 @@ class Block:
         sweep = self.sweeps[keys[0]]
         return sweep.count or design_size(sweep.kind, self.sample.n or 0, len(keys))
 
-    def sizes(self) -> dict[str, int]:
-        """Return how many values each factor has, by its keys."""
-        return {" with ".join(keys): self.size(keys) for keys in self.factors}
+    @property
+    def combinations(self) -> int:
+        """Return how many jobs there are with those that are left out."""
+        return math.prod(map(self.size, self.factors))
 
     @cached_property
     def columns(self) -> dict[str, list[Any]]:
@@ -184,20 +185,16 @@ class Block:
         return found
 
     def find_repeated(self) -> Iterator[FileProblem]:
-        """Yield the values that keys have twice; of values that were made the first one."""
+        """Yield the values that stand twice in the lists of keys."""
         for keys in self.factors:
             sweep = self.sweeps[keys[0]]
             seen: set[str] = set()
-            is_list = sweep.kind == "list"
-            where = "in the list" if is_list else "among its values"
             columns = (self.columns[key] for key in keys)
             for number, values in enumerate(zip(*columns, strict=True)):
-                if (text := repr(values)) in seen:
-                    place = self.tree.at(*sweep.path, *[number] * is_list)[1]
-                    message = f"{', '.join(map(quote_value, values))} is {where} twice"
+                if (text := repr(values)) in seen and sweep.kind == "list":
+                    place = self.tree.at(*sweep.path, number)[1]
+                    message = f"{', '.join(map(quote_value, values))} is in the list twice"
                     yield FileProblem(place, " with ".join(keys), message)
-                    if not is_list:
-                        break
                 seen.add(text)
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from compsim import cli
 
-from compressor.cases.materials import contact_stiffness, paper_notes
+from compressor.cases.materials import paper_notes
 
 # single throw, stroke 180 mm, rod 450 mm, 740 rpm, bore 220 mm, 2 to 7 bar
 MACHINE = """
@@ -29,10 +29,7 @@ gas:
 def test_its_contact_is_told_to_be_of_another_pin(read):
     (case,) = read("load: gas" + MACHINE).cases
     note = paper_notes(case)["contact.stiffness_N_per_mm15"]
-    inside = contact_stiffness("steel", "steel", 0.035, 0.0352, internal=True) / 1000**1.5
-    assert note.startswith("336000 N/mm^1.5 is the paper's, of a pin of 10 mm radius; of steel on")
-    assert f"Eq. 15 gives {inside:.3g} for one of 35 mm in its bore" in note
-    assert "60 mm" not in note  # its big end is ideal
+    assert note.startswith("336000 N/mm^1.5 is the paper's, of a pin of 10 mm radius: give contact")
     given = replace(case, contact=replace(case.contact, stiffness_N_per_mm15=5e6))
     assert paper_notes(given) == {}
 

@@ -79,8 +79,7 @@ def test_a_bomb_is_counted_not_made(read, text, where, count):
     (message,) = refused(read, text)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert message.startswith(f"case.yaml:{where}{count} jobs are more than 10000: ")
-    assert message.endswith("ask for fewer, or raise --max-jobs")
+    assert message.startswith(f"case.yaml:{where}{count} jobs are more than 10000: ask for")
     assert peak < 4e6
 
 

@@ -42,7 +42,7 @@ MISTAKES = [
     ("run good.yaml -j -2", "'-j' / '--jobs'", "-2", "x>=1"),
     ("run good.yaml -j all", "'-j' / '--jobs'", "'all' is not a valid number"),
     ("run good.yaml --set 'load=[none, spring]' --max-jobs 1",
-     "--set load=[none, spring]: load: 2 jobs are more than 1: load (2); ask for fewer, or"),
+     "--set load=[none, spring]: load: 2 jobs are more than 1: ask for fewer, or"),
     ("run good.yaml --only 'clearance_mm > 9'", "selects no job", "compsim plan"),
     *((f"run good.yaml --shard {part}", "no I/N with 1 <= I <= N, such as 2/8")
       for part in ("0/2", "3/2", "2", "a/b", "1/-2")),
