@@ -13,7 +13,6 @@ from compressor.cases.laws import (
     CONTACT_LAWS,
     CYLINDRICAL,
     FRICTION_LAWS,
-    by_law,
     fill_by_law,
     or_own,
 )
@@ -346,39 +345,35 @@ class Contact:
         None, ("external", "internal"),
         "radii in the materials' stiffness: of two discs (the paper's, and the default for its "
         "pin), or of a pin in a bore (the default with a pin radius of a file's own)",
-        "Eq. 15", read=(CLEARANCE, *by_law("contact", "geometry"), "contact.materials"),
+        "Eq. 15", read=(CLEARANCE, "contact.materials"),
     )  # fmt: skip
     exponent: float = number(
         1.5, "[1, 3]", "force exponent p", "Table 3",
-        read=(*by_law("contact", "exponent"), or_own("exponent")), judged=(1.0, 2.2),
+        read=or_own("exponent"), judged=(1.0, 2.2),
     )  # fmt: skip
     damping_N_s_per_mm: float = number(
         336.0, "[0, 1e9]", "greatest contact damping C_max", "Table 3",
-        read=(*by_law("contact", "damping_N_s_per_mm"), or_own("damping_N_s_per_mm")),
-        judged=(0, 33600),
+        read=or_own("damping_N_s_per_mm"), judged=(0, 33600),
     )  # fmt: skip
     full_damping_mm: float = number(
         0.1, "(0, 1e3]", "penetration of full damping d_max", "Table 3",
-        read=(*by_law("contact", "full_damping_mm"), or_own("full_damping_mm")),
+        read=or_own("full_damping_mm"),
     )  # fmt: skip
     restitution: float | None = number(
-        None, "(0, 1]", "coefficient of restitution, in laws that damp by it",
-        read=by_law("contact", "restitution"), judged=(0.3, 0.95),
-    )  # fmt: skip
+        None, "(0, 1]", "coefficient of restitution, in laws that damp by it", judged=(0.3, 0.95)
+    )
     least_approach_mm_per_s: float | None = number(
         None, "(0, 1e6]",
         "approach speed below which the damping stays that of this speed; 10 by default",
-        read=(*by_law("contact", "least_approach_mm_per_s"), "contact.restitution > 0"),
-        judged=(1.0, 100.0),
+        read="contact.restitution > 0", judged=(1.0, 100.0),
     )  # fmt: skip
     length_mm: PerJoint[float] | None = by_part(
         PerJoint,
         number(None, "(0, 1e4]", "length (johnson, liu)", judged=(10.0, 100.0), fact=True),
-        {joint: (own, *by_law("contact", "length_mm")) for joint, own in AT_JOINTS.items()},
+        AT_JOINTS,
     )  # fmt: skip
     modulus_GPa: float | None = number(
-        None, "(0, 1e6]", "composite modulus (johnson, liu)",
-        read=(CLEARANCE, *by_law("contact", "modulus_GPa")), judged=(10.0, 250.0),
+        None, "(0, 1e6]", "composite modulus (johnson, liu)", read=CLEARANCE, judged=(10.0, 250.0),
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -407,33 +402,28 @@ class Friction:
     True
     """
 
-    static: float = number(
-        0.23, "[0, 10]", "static coefficient", "Table 3", read=by_law("friction", "static"),
-        judged=(0, 0.5),
-    )  # fmt: skip
+    static: float = number(0.23, "[0, 10]", "static coefficient", "Table 3", judged=(0, 0.5))
     dynamic: float = number(0.15, "[0, 10]", "dynamic coefficient", "Table 3", judged=(0, 0.5))
     stiction_velocity_mm_per_s: float = number(
         10.0, "(0, 1e6]", "stiction transition velocity", "Table 3", judged=(0.1, 100)
     )
     friction_velocity_mm_per_s: float = number(
-        100.0, "(0, 1e6]", "friction transition velocity", "Table 3",
-        read=by_law("friction", "friction_velocity_mm_per_s"),
-    )  # fmt: skip
+        100.0, "(0, 1e6]", "friction transition velocity", "Table 3"
+    )
     law: str | None = choice(
         None, FRICTION_LAWS, "friction law (adams where none is named)", "Eq. 16"
     )
     bristle_stiffness_per_mm: float | None = number(
         None, "(0, 1e9]", "LuGre's sigma_0 over the normal force; 100 by default",
-        read=by_law("friction", "bristle_stiffness_per_mm"), judged=(10.0, 1e4),
+        judged=(10.0, 1e4),
     )  # fmt: skip
     bristle_damping_s_per_mm: float | None = number(
         None, "[0, 1e6]", "LuGre's sigma_1 over the normal force; 0.03 by default",
-        read=by_law("friction", "bristle_damping_s_per_mm"), judged=(1e-3, 0.1),
+        judged=(1e-3, 0.1),
     )  # fmt: skip
     viscous_s_per_mm: float | None = number(
-        None, "[0, 1e6]", "LuGre's sigma_2 over the normal force; 0 by default",
-        read=by_law("friction", "viscous_s_per_mm"),
-    )  # fmt: skip
+        None, "[0, 1e6]", "LuGre's sigma_2 over the normal force; 0 by default"
+    )
     ideal_joints: bool | None = flag(
         None, "friction in joints without clearance, too",
         read="not (clearance_mm.big_end > 0 and clearance_mm.small_end > 0)",

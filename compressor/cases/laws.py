@@ -1,8 +1,9 @@
 """The laws of contact and friction that a case chooses from, and the keys that each reads.
 
 Who reads a key: conditions on a case, in the language of `--only` (`compressor.cases.comparison`).
-The fields of the groups name theirs (`read=`), and so do the groups in `compressor.cases.table`. A
-key without one is read by every job. `compressor.cases.conflicts` refuses what no job reads.
+The fields of the groups name theirs (`read=`), and so do the groups in `compressor.cases.table`,
+which adds those of `READ_BY`. A key without one is read by every job. `compressor.cases.conflicts`
+refuses what no job reads.
 """
 
 from typing import Any
@@ -64,8 +65,10 @@ def or_own(key: str) -> str:
 
 
 def by_law(group: str, key: str) -> tuple[str, ...]:
-    """Return who reads a key of contact or friction that some laws alone read."""
-    readers = READ_BY[group][key]
+    """Return who reads a key that some laws of contact or friction alone read; () for another."""
+    readers = READ_BY.get(group, {}).get(key)
+    if not readers:
+        return ()
     every = CONTACT_LAWS if group == "contact" else FRICTION_LAWS
     others = [law for law in every if law not in readers]
     if "adams" in readers or len(others) < len(readers):  # which a file need not name

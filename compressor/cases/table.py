@@ -5,7 +5,7 @@ from functools import cache
 from typing import Any
 
 from compressor.cases.groups import Contact, Friction, Gas, Machine, Offset, Output, Solve, Spring
-from compressor.cases.laws import CLEARANCE
+from compressor.cases.laws import CLEARANCE, by_law
 from compressor.cases.optional_groups import Body, Drive, Guide, Lubricant, Rod, Sensor, Wear
 from compressor.cases.parameter import (
     PART_WORDS,
@@ -75,7 +75,8 @@ def table() -> dict[str, Parameter]:
     rows = [row for name, item in TOP.items() for row in rows_of(name, item)]
     for group, of in GROUPS.items():
         for item in dataclasses.fields(of):
-            rows += rows_of(f"{group}.{item.name}", item, READ.get(group, ()))
+            of_law = by_law(group, item.name)
+            rows += rows_of(f"{group}.{item.name}", item, (*READ.get(group, ()), *of_law))
     return {row.key: row for row in rows}
 
 
