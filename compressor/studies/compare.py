@@ -34,6 +34,11 @@ QUIET = 1e-4  # share of the loudest third octave below which none is compared
 SAME_BAND = 0.5  # dB, to which a third octave of a job is taken as known
 UNSAID = {"joint", "clearance_mm", "sensor"}  # swept groups that are told otherwise, or not
 MAX_LISTED = 20  # jobs
+NEAR = 0.25  # share by which a ratio may differ from one between two units
+MISTAKES = {  # ratio of rms -> what was probably mistaken
+    9.80665: "m/s2 were perhaps read as g", 1 / 9.80665: "g were perhaps read as m/s2",
+    1000.0: "mm/s2 were perhaps read as m/s2", 1e-3: "m/s2 were perhaps read as mm/s2",
+}  # fmt: skip
 MAX_DRAWN = 3  # jobs
 KEY_DIGITS = 10
 
@@ -230,8 +235,8 @@ class Compared:
 class Comparison:
     """A record beside jobs, the most alike first.
 
-    remarks: how a file was read; orders: the highest that the record holds; left_out: jobs without
-    a record that can be used.
+    remarks: how a file was read, and which unit it was perhaps written in; orders: the highest that
+    the record holds; left_out: jobs without a record that can be used.
     """
 
     name: str
@@ -282,8 +287,11 @@ def compare_record(
         text = f"none of the {len(wanted)} jobs has a sensor's record of two revolutions"
         raise StudyError(f"{text}: run them with body: true, sensor: true and series kept")
     jobs.sort(key=lambda job: np.nan_to_num(job.likeness["difference"].value, nan=math.inf))
+    ratio = jobs[0].likeness["rms_ratio"].value
+    unit = [f"the rms is {ratio:.3g} times the job's: {text}; check --unit"
+            for size, text in MISTAKES.items() if abs(ratio / size - 1.0) <= NEAR]  # fmt: skip
     return Comparison(
-        name, record.remarks, mine, own[mine.highest], mine.highest, tuple(jobs),
+        name, (*record.remarks, *unit), mine, own[mine.highest], mine.highest, tuple(jobs),
         len(wanted) - len(jobs),
     )  # fmt: skip
 

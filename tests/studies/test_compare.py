@@ -8,10 +8,11 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 from conftest import store_cases
+from scipy.io import wavfile
 
 from compressor.studies.compare import CAPTION, curves, measure_likeness
 from compressor.studies.frame import by_revolutions
-from compressor.vibration import Record
+from compressor.vibration import Record, read_record, record_columns
 
 HEARD = {"length_rev": 10, "noise_m_per_s2": 0.05}
 CASE = {
@@ -63,6 +64,26 @@ def export(folder, compsim):
     path = folder[0] / "record.csv"
     compsim("export", folder[1], "-r", folder[0] / "results", "-o", path, "--force")
     return path
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("unit", "told"),
+    [
+        ("g", "read: the rms is 9.81 times the job's: m/s2 were perhaps read as g; check --unit"),
+        ("mm/s2", "read: the rms is 0.001 times the job's: m/s2 were perhaps read as mm/s2; check"),
+    ],
+)
+def test_a_unit_that_was_perhaps_mistaken_is_named(unit, told, folder, compare, export):
+    record, path = read_record(export), folder[0] / "record.wav"
+    tacho = record_columns(record.times, record.values, record.tacho)["tacho"]
+    signals = np.stack([record.values, tacho], axis=1).astype(np.float32)
+    wavfile.write(path, round(1 / record.times[1]), signals)
+    words = ["--channel", "1", "--tacho", "2", "--tacho-deg", "20", "--unit"]
+    assert told in compare(path, folder[1], *words, unit)
+    assert "perhaps" not in compare(path, folder[1], *words, "in/s2")
+    (job,) = json.loads(compare(path, folder[1], *words, "m/s2", "--json"))["jobs"]
+    assert job["rms_ratio"]["value"] == pytest.approx(1.0, rel=0.01)
 
 
 @pytest.mark.compiled
