@@ -186,11 +186,10 @@ def draw_study(stored: Stored, study: StoredStudy, choice: PlotChoice) -> Iterat
     if "segments" in figures:
         rows = with_segments(stored, jobs, rows, limit)
     for name in figures:
-        needs = STUDY[name].needs
-        lack = [need for need in needs if all(getattr(row, need) is None for row in rows)]
-        if lack and choice.what:
-            raise PlotError(LACK[lack[0]].format(study.name))
-        if lack:
+        if name == "segments" and not any(row.segments for row in rows):
+            if choice.what:
+                raise PlotError(f"no job of {study.name} has a sensor's record in segments: run it "
+                                "with body: true and sensor: true")  # fmt: skip
             continue
         kept = keep_sensed(rows) if name == "cycles" else rows
         shown = STUDY[name].make(kept, axis_words(over), units=choice.units)
@@ -233,12 +232,6 @@ def axis_words(key: str) -> str:
     unit = (row.unit if row else "") or ""
     name = name_in_words(coordinate_names([key])[key], unit)
     return f"{name} ({unit})" if unit else name
-
-
-LACK = {  # why a study has no figure that needs what no row has
-    "segments": "no job of {} has a sensor's record in segments: run it with body: true and "
-    "sensor: true"
-}
 
 
 def read_limit(text: str) -> tuple[float, bool] | None:

@@ -22,7 +22,6 @@ LOADS = {"typical": "typical model (gas force)", "design": "design model (spring
 KILONEWTON = 1e-3
 TICK = 90.0  # degrees between ticks
 SAME_CURVE = 1e-9  # curves closer than this share of their range are one curve
-NEARLY = 0.98  # of the greatest difference: the first window that has this much is taken
 WINDOW = LineStyle(BLACK, linewidth=1.1, zorder=3)
 MIN_MARK = 0.05  # of a panel's height: a flatter mark would not be seen
 
@@ -143,7 +142,6 @@ def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, 
     half = count // 2
     inner = slice(half, half + angle.size - count + 1)  # the middle of every window
     differs = bool((high - low).max() > SAME_CURVE * np.ptp(values))
-    nearly = NEARLY if differs else 1 - SAME_CURVE
     if not differs:
         score = np.abs(values[0])[inner]
     elif quantity.steep:
@@ -152,11 +150,5 @@ def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, 
         score = sliding_window_view(high - low, count).mean(axis=1) / height
     else:
         score = (high - low)[inner]
-    start = first_peak(score, nearly, half)
+    start = int(np.argmax(score))
     return slice(start, start + count), differs
-
-
-def first_peak(score: np.ndarray, nearly: float, reach: int) -> int:
-    """Return the place of the first maximum that is nearly the greatest."""
-    first = int(np.argmax(score >= nearly * score.max()))
-    return first + int(np.argmax(score[first : first + reach + 1]))

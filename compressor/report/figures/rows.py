@@ -163,7 +163,7 @@ def draw_cycles(rows: Sequence[SweptRow], title: str, units: Units = "usual") ->
     )
 
 
-@figure("study", "segments", "vibration in segments of 10°", "segments")
+@figure("study", "segments", "vibration in segments of 10°")
 def draw_segments(rows: Sequence[SweptRow], title: str, units: Units = "usual") -> DrawnFigure:
     """Return the rms in segments of 10 degrees over the healthy machine's, a row a value.
 

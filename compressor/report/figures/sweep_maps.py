@@ -34,7 +34,6 @@ from compressor.report.limits import NO_LIMITS, Limits
 
 COLORS = "cividis"
 MAX_CELLS = 64  # along an axis
-MAX_NAMED_VALUES, MIN_NAMED_GAP = 6, 0.15  # of an axis; share of what it spans
 NOTHING = fill("#f2f2f2", edge=GREY, is_hatched=True)
 
 
@@ -119,15 +118,11 @@ def mark_cells(panel: Panel, cells: Cells, status: np.ndarray, chaotic: np.ndarr
 
 
 def scale_map(panel: Panel, way: Way, axis: PlottedAxis, words: Sequence[str]) -> None:
-    """Set the x or the y axis of a map: words or a few values in its cells, or a log scale."""
+    """Set the x or the y axis of a map: words in its cells, or a log scale."""
     if axis.is_words:
         panel.name_ticks(way, words)
     elif axis.is_log:
         panel.axis(way).type = "log"
-    elif 1 < len(words) <= MAX_NAMED_VALUES:
-        gaps = np.diff(np.sort(axis.places))
-        if gaps.min() >= MIN_NAMED_GAP * gaps.sum():  # else their texts overlap
-            panel.name_ticks(way, words, axis.places)
 
 
 COLUMNS = 4

@@ -59,7 +59,7 @@ class Figure:
 
     `make` takes runs by the labels in `needs`, of the paper's cases; a job's run and the same
     machine without clearance, where `needs` has `clearance` or `gas` if the job has these; or the
-    rows of a study and the name of its axis, where `needs` has what any of the rows must have.
+    rows of a study and the name of its axis.
     """
 
     name: str
