@@ -32,7 +32,7 @@ from compressor.store import (
     read_store,
     swept_column,
 )
-from compressor.studies.frame import Row, StudyError, rows_dataset
+from compressor.studies import frame
 from compressor.vibration import RecordError
 
 CLAIMS = tuple(range(1, len(RULES) + 1))
@@ -74,7 +74,9 @@ def machines(source: StoredStudy) -> dict[Key, dict[str, str]]:
         if name in LABELS:
             found.setdefault(machine, {})[name] = key
     if not any(len(jobs) == len(LABELS) for jobs in found.values()):
-        raise StudyError(f"study {source.name} has no machine with the paper's cases: {REMEDY}")
+        raise frame.StudyError(
+            f"study {source.name} has no machine with the paper's cases: {REMEDY}"
+        )
     return found
 
 
@@ -112,11 +114,11 @@ def judge_machines(
     }
     coords["claim"] = "claim", np.array(CLAIMS), {"long_name": "claim of the paper"}
     thresholds = "; ".join(f"{n}. {rule.threshold}" for n, rule in zip(CLAIMS, RULES, strict=True))
-    judged = rows_dataset(rows, "machine", TEXTS, NUMBERS).assign_coords(coords)
+    judged = frame.rows_dataset(rows, "machine", TEXTS, NUMBERS).assign_coords(coords)
     return judged.assign_attrs(thresholds=thresholds, study=source.name)
 
 
-def measure(runs: Mapping[str, xr.Dataset], failed: str = "") -> Row:
+def measure(runs: Mapping[str, xr.Dataset], failed: str = "") -> frame.Row:
     """Return the `NUMBERS` and `TEXTS` of one machine's runs by label.
 
     failed: which cases there are not, and why; margins are nan then, and of runs that are too

@@ -19,7 +19,7 @@ from compressor.digits import align_columns, plural
 from compressor.program import Progress, no_progress, report_progress
 from compressor.report import PlotlyFigure, make_grid, style
 from compressor.store import Folder, find_record, job_record, read_store, read_studies, report_job
-from compressor.studies.frame import Revolutions, StudyError, by_revolutions
+from compressor.studies import frame
 from compressor.vibration import RecordError, segment_levels
 
 SEGMENTS = 36
@@ -241,7 +241,7 @@ class Comparison:
 
     name: str
     remarks: tuple[str, ...]
-    turned: Revolutions
+    turned: frame.Revolutions
     curves: Curves
     orders: int
     jobs: tuple[Compared, ...]
@@ -262,7 +262,7 @@ def compare_record(
     or orders are too few.
     """
     key, record = find_record(name, folder, hints)
-    mine = by_revolutions(record)
+    mine = frame.by_revolutions(record)
     check_orders(mine.highest, name)
     own = {mine.highest: curves(mine.lines(mine.highest))}  # by the highest order
     stored = read_store(folder, warn=True)
@@ -273,7 +273,7 @@ def compare_record(
         if other is None or case is None or not case.sensor:
             continue
         with contextlib.suppress(RecordError):  # too short, or all zero
-            theirs = by_revolutions(other)
+            theirs = frame.by_revolutions(other)
             orders = min(mine.highest, theirs.highest)
             check_orders(orders, f"job {one}")
             lines, others = mine.lines(orders), theirs.lines(orders)
@@ -285,7 +285,7 @@ def compare_record(
             jobs.append(Compared(one, what, theirs.rpm, place, orders, likeness, drawn))
     if not jobs:
         text = f"none of the {len(wanted)} jobs has a sensor's record of two revolutions"
-        raise StudyError(f"{text}: run them with body: true, sensor: true and series kept")
+        raise frame.StudyError(f"{text}: run them with body: true, sensor: true and series kept")
     jobs.sort(key=lambda job: np.nan_to_num(job.likeness["difference"].value, nan=math.inf))
     ratio = jobs[0].likeness["rms_ratio"].value
     unit = [f"the rms is {ratio:.3g} times the job's: {text}; check --unit"
@@ -300,7 +300,9 @@ def check_orders(orders: int, what: str) -> None:
     """Raise StudyError where a sampling rate holds too few orders."""
     if orders <= ORDER:
         text = f"{what}: the sampling rate holds the orders up to {orders} alone"
-        raise StudyError(f"{text}: record with more than {ORDER + 1} times 2.56 samples a turn")
+        raise frame.StudyError(
+            f"{text}: record with more than {ORDER + 1} times 2.56 samples a turn"
+        )
 
 
 def describe_job(case: Case, swept: Mapping[str, Any]) -> str:

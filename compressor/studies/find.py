@@ -23,7 +23,7 @@ from compressor.metrics import AXES, BARRED, JOINTS, NUMBERS, SEGMENTS, THRESHOL
 from compressor.program import Progress, did_you_mean, no_progress
 from compressor.solve import average_bar
 from compressor.store import Folder, StoreError, read_store
-from compressor.studies.frame import GrowingStudy, KeySpan, StudyError
+from compressor.studies import frame
 from compressor.units import Units, read_quantity, unit_in
 
 # ---- the question
@@ -118,14 +118,14 @@ def comparison(text: str) -> Goal:
     """Return the goal of a comparison such as `peak_acceleration > 600`. Raises StudyError."""
     parts = COMPARISON.fullmatch(text)
     if parts is None:
-        raise StudyError(f"{text!r} {NO_COMPARISON}")
+        raise frame.StudyError(f"{text!r} {NO_COMPARISON}")
     goal = goal_of(parts[1], parts[2])
     try:
         limit = read_quantity(parts[3], BARRED[goal.metric].unit)
     except ValueError as error:
-        raise StudyError(f"{text!r}: {error}") from error
+        raise frame.StudyError(f"{text!r}: {error}") from error
     if limit is None:
-        raise StudyError(f"{text!r} {NO_COMPARISON}")
+        raise frame.StudyError(f"{text!r} {NO_COMPARISON}")
     return replace(goal, limit=limit)
 
 
@@ -134,12 +134,12 @@ def goal_of(text: str, sign: str) -> Goal:
     metric, *place = text.strip().split(".")
     if metric not in BARRED:
         hint = did_you_mean(metric, BARRED) or f"there are {', '.join(BARRED)}"
-        raise StudyError(f"unknown metric {metric!r}; {hint}")
+        raise frame.StudyError(f"unknown metric {metric!r}; {hint}")
     dims = BARRED[metric].dims
     good = len(place) == len(dims) and all(w in WORDS[d] for w, d in zip(place, dims, strict=True))
     if not good:
         words = "".join(f".{'|'.join(WORDS[dim])}" for dim in dims)
-        raise StudyError(f"{text!r}: write {metric}{words}")
+        raise frame.StudyError(f"{text!r}: write {metric}{words}")
     return Goal(metric, tuple(place), sign)
 
 
@@ -152,7 +152,7 @@ class Question:
     """
 
     path: str
-    span: KeySpan
+    span: frame.KeySpan
     goal: Goal
     tolerance: float = 1e-3
     scan: int = 9
@@ -170,14 +170,16 @@ class Question:
         """
         key, value = self.span.key, self.span.value
         if key in [one.partition("=")[0].strip() for one in self.overrides]:
-            raise StudyError(f"--set {key}: --over searches over it; leave one of the two out")
+            raise frame.StudyError(
+                f"--set {key}: --over searches over it; leave one of the two out"
+            )
         ends = [self._load(f"{value(share)!r}") for share in (0.0, 1.0)]
         if ends[0].jobs > 1:
             axes = ", ".join(axis.key for axis in ends[0].axes)
-            raise StudyError(f"{self.path} makes {ends[0].jobs} jobs for one {key}, it sweeps "
-                             f"{axes}: choose one case by --set")  # fmt: skip
+            text = f"{self.path} makes {ends[0].jobs} jobs for one {key}, it sweeps {axes}"
+            raise frame.StudyError(f"{text}: choose one case by --set")
         if ends[0].keys == ends[1].keys:
-            raise StudyError(f"{key} changes nothing in the case of {self.path}")
+            raise frame.StudyError(f"{key} changes nothing in the case of {self.path}")
         return self._load(f"[{', '.join(repr(value(share)) for share in self.shares)}]")
 
     def _load(self, value: str) -> Study:
@@ -352,7 +354,7 @@ def find(
     """
     question.load_first()
     span = question.span
-    study = GrowingStudy(
+    study = frame.GrowingStudy(
         question.path, [span.key], f"-find-{span.key}", folder, question.overrides,
         workers, progress,
     )  # fmt: skip

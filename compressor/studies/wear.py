@@ -23,7 +23,7 @@ from compressor.reasons import Reason
 from compressor.report import PlotlyFigure, make_grid, style
 from compressor.solve import simulate
 from compressor.store import Folder, StoreError, writable_folder
-from compressor.studies.frame import Row, StudyError, hash_key, rows_dataset, run_rows, stored_rows
+from compressor.studies import frame
 from compressor.sweep import End
 
 FOLDER = "wear"
@@ -63,7 +63,7 @@ class Worn:
 
     @cached_property
     def key(self) -> str:
-        return hash_key([self.case.key, self.case.values()["wear"], SCHEMA])
+        return frame.hash_key([self.case.key, self.case.values()["wear"], SCHEMA])
 
     @property
     def clearances(self) -> np.ndarray:
@@ -113,7 +113,7 @@ class Worn:
     def path(self, folder: Folder) -> Path:
         return Path(folder) / FOLDER / f"{self.key}.nc"
 
-    def over(self, stage: Row) -> bool:
+    def over(self, stage: frame.Row) -> bool:
         """Return whether a stage is the last one: worn out, at the end of its hours, or failed."""
         late = bool(stage["hours"] >= self.most_hours)
         return bool(stage["reason"]) or late or bool((stage["clearance"] >= self.limit).any())
@@ -126,17 +126,17 @@ class Worn:
     def seconds(self) -> float:
         return AT_MOST * self.case.solve.timeout_s
 
-    def count_done(self, rows: Sequence[Row]) -> int:
+    def count_done(self, rows: Sequence[frame.Row]) -> int:
         """Return 1 if all its stages are there, else 0."""
         return int(bool(rows) and self.over(rows[-1]))
 
-    def make_row(self, rows: Sequence[Row]) -> Row:
+    def make_row(self, rows: Sequence[frame.Row]) -> frame.Row:
         """Run the next stage, or that of unworn bores."""
         return next_stage(self, rows[-1]) if rows else follow_stage(self, 0.0, self.clearances)
 
-    def to_dataset(self, rows: Sequence[Row]) -> xr.Dataset:
+    def to_dataset(self, rows: Sequence[frame.Row]) -> xr.Dataset:
         """Return its stages, with the dimension `stage`."""
-        found = rows_dataset(rows, "stage", TEXTS, NUMBERS)
+        found = frame.rows_dataset(rows, "stage", TEXTS, NUMBERS)
         worn = found["clearance"].values - self.clearances
         about = {"units": "m3", "long_name": "volume that is worn off"}
         found["worn_volume"] = ("stage", "joint"), worn * self.bore_area, about
@@ -145,10 +145,10 @@ class Worn:
         return found.assign_coords(where).assign_attrs(attrs)
 
 
-def follow_stage(machine: Worn, hours: float, clearances: np.ndarray) -> Row:
+def follow_stage(machine: Worn, hours: float, clearances: np.ndarray) -> frame.Row:
     """Return the stage at clearances (m) that were worn in some hours: a run, and what it rubs."""
-    row: Row = {"hours": hours, "clearance": clearances, "turn": math.nan,
-                "rubbing_work": np.full(len(JOINTS), math.nan)}  # fmt: skip
+    row: frame.Row = {"hours": hours, "clearance": clearances, "turn": math.nan,
+                      "rubbing_work": np.full(len(JOINTS), math.nan)}  # fmt: skip
     try:
         run = simulate(machine.case_at(clearances))
     except CaseError as error:  # such as clearances that exceed the pins
@@ -163,7 +163,7 @@ def follow_stage(machine: Worn, hours: float, clearances: np.ndarray) -> Row:
     return row
 
 
-def next_stage(machine: Worn, stage: Row) -> Row:
+def next_stage(machine: Worn, stage: frame.Row) -> frame.Row:
     """Return the stage after one that is not the last; by the midpoint rule."""
     opened, rate = stage["clearance"], machine.depth_per_work * stage["rubbing_work"]
     left = (machine.most_hours - stage["hours"]) * 3600.0 / stage["turn"]
@@ -187,7 +187,7 @@ def open_wear(folder: Folder, case: Case) -> xr.Dataset:
     such clearances. Raises StoreError where there is nothing of it.
     """
     worn = Worn(case)
-    rows = stored_rows(worn, folder)
+    rows = frame.stored_rows(worn, folder)
     if not rows:
         raise StoreError(worn.path(folder), "is not there", "compsim wear the case file")
     return worn.to_dataset(rows)
@@ -245,15 +245,17 @@ def check_wear(studies: Sequence[Study]) -> None:
     """Raise StudyError unless each case wears, and is measured over whole revolutions."""
     for study, case in ((one, case) for one in studies for case in one.cases):
         if case.joint == "none":
-            raise StudyError(f"{study.path}: joint: none has no bore that wears: leave none out")
+            raise frame.StudyError(
+                f"{study.path}: joint: none has no bore that wears: leave none out"
+            )
         if not case.wear:
             remedy = "write wear: true, or keys of it (compsim schema)"
-            raise StudyError(f"{study.path}: has no wear: {remedy}")
+            raise frame.StudyError(f"{study.path}: has no wear: {remedy}")
         if case.solve.duration_rev == "auto":
             continue
         turns = (case.duration - case.settle) / case.turn
         if abs(turns - round(turns)) > 1e-9 or turns < 1.0 - 1e-9:
-            raise StudyError(
+            raise frame.StudyError(
                 f"{study.path}: solve.duration_rev: {turns:g} after settle_rev must be whole "
                 "revolutions, one at least"
             )
@@ -274,7 +276,7 @@ def run_wear(
         for study in studies
         for point, case in zip(points(study), study.cases, strict=True)
     ]
-    done, lost = run_rows([worn for _, _, worn in listed], folder, workers, progress, rerun)
+    done, lost = frame.run_rows([worn for _, _, worn in listed], folder, workers, progress, rerun)
     return [worn_machine(*one, folder, lost.get(one[2].key)) for one in listed], done
 
 
@@ -282,7 +284,7 @@ def worn_machine(
     study: str, point: dict[str, Any], worn: Worn, folder: Folder, end: End | None
 ) -> WornMachine:
     """Return a machine of a study by its stored stages; end: how its worker was lost, if it was."""
-    kept = stored_rows(worn, folder)
+    kept = frame.stored_rows(worn, folder)
     if not kept:
         why = (str(end.reason), end.detail) if end else ("", "")
         return WornMachine(study, point, worn, None, None, *why)

@@ -20,7 +20,6 @@ from compressor.studies.claims import (
     CLAIMS,
     RECIPROCATING,
     ROD,
-    StudyError,
     draw,
     judge_machines,
     machines,
@@ -28,6 +27,7 @@ from compressor.studies.claims import (
     sensitivity,
     table,
 )
+from compressor.studies.frame import StudyError
 from compressor.sweep.sweep import Options, in_this_process, sweep
 
 QUICK = "solve: {accuracy: draft, duration_rev: 2, output_step_deg: 1}\n"

@@ -30,6 +30,7 @@ from compressor.metrics import JOINTS
 from compressor.program import Progress, no_progress
 from compressor.report import PlotlyFigure, make_grid, style
 from compressor.store import Folder, StoredStudy, find_study, read_dataset
+from compressor.studies import frame
 from compressor.studies.alarms.readings import (
     ALARMS,
     BODY_VELOCITY,
@@ -40,7 +41,6 @@ from compressor.studies.alarms.readings import (
     default_bands,
     read_windows,
 )
-from compressor.studies.frame import StudyError, no_records, records
 from compressor.vibration import RecordError
 
 SOUND = "none"  # the joint that is worn in a sound machine
@@ -81,7 +81,7 @@ def read_study(
     rows: list[tuple[str, float, str, str]] = []
     readings: dict[tuple[int, str], list[Readings]] = defaultdict(list)
     clipped = 0
-    for job in records(folder, source, left, progress):
+    for job in frame.records(folder, source, left, progress):
         case, record = job.case, job.record
         assert case.body  # which made the record
         assert case.sensor
@@ -115,7 +115,7 @@ def read_study(
         rows += [(joint, clearance, json.dumps(varied, sort_keys=True), job.key)] * count
         clipped += float(job.outcome.numbers["clipped_fraction"]) >= Sensor.REPORTED
     if not rows:
-        raise no_records(source, left, revolutions)
+        raise frame.no_records(source, left, revolutions)
     stacked = {
         place: {name: np.concatenate([one[name] for one in some]) for name in some[0]}
         for place, some in readings.items()
@@ -129,7 +129,7 @@ def check_bands(bands: Sequence[Band], key: str, rate: float, passes: float) -> 
     top = min(rate / 2.0, passes)
     for low, high in bands:
         if high > top * (1.0 + 1e-9):
-            raise StudyError(
+            raise frame.StudyError(
                 f"band {low:g}-{high:g} Hz: job {key} is sampled at {rate:.6g} Hz, and its sensor "
                 f"passes up to {passes:g} Hz (sensor.low_pass_Hz, or the resonance "
                 f"sensor.mounting_Hz): give bands up to {top:g} Hz"
@@ -141,14 +141,14 @@ def check_draws(source: StoredStudy, windows: Windows) -> None:
     sound = windows.joints == SOUND
     count = len({*windows.draws[sound].tolist()})
     if count < MIN_SOUND:
-        raise StudyError(
+        raise frame.StudyError(
             f"study {source.name} has {count} draws of a sound machine (joint: none, or clearances "
             f"up to healthy_clearance_mm), and limits need {MIN_SOUND} at the least, for 1 % of "
             "false alarms 124: draw load and speed, such as machine.speed_rpm: {random: "
             "[700, 780]} with sample: {n: 124}"
         )
     if sound.all():
-        raise StudyError(
+        raise frame.StudyError(
             f"study {source.name}: none of its jobs with a record is worn: add clearances beyond "
             "healthy_clearance_mm, or a joint, and run it again"
         )
@@ -326,14 +326,14 @@ def read_wear(place: str | Path) -> xr.Dataset:
     if path.is_dir():
         files = sorted({*path.glob("*.nc"), *path.glob("wear/*.nc")})
         if len(files) != 1:
-            raise StudyError(f"{path} has {len(files)} wear runs: {WEAR_REMEDY}")
+            raise frame.StudyError(f"{path} has {len(files)} wear runs: {WEAR_REMEDY}")
         path = files[0]
     try:
         run = read_dataset(path, WEAR_REMEDY)
     except OSError as error:
-        raise StudyError(f"{path}: {error.strerror}: {WEAR_REMEDY}") from error
+        raise frame.StudyError(f"{path}: {error.strerror}: {WEAR_REMEDY}") from error
     if not {"hours", "clearance"} <= {*run.variables} or "case" not in run.attrs:
-        raise StudyError(f"{path} holds no wear run: {WEAR_REMEDY}")
+        raise frame.StudyError(f"{path} holds no wear run: {WEAR_REMEDY}")
     return run
 
 

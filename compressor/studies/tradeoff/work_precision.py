@@ -16,7 +16,7 @@ from compressor.cases import ACCURACY, METHODS, Study, load_studies, points
 from compressor.digits import align_columns
 from compressor.report import Panel, PlotlyFigure, make_grid, rectangle, style
 from compressor.store import Folder, read_job, read_store
-from compressor.studies.frame import MAX_NAME, StudyError, replace_settings, without_keys
+from compressor.studies import frame
 from compressor.sweep import Options, sweep
 
 ENDING = "-tradeoff"  # of the study's name
@@ -46,14 +46,14 @@ def load_methods(path: str, overrides: Sequence[str], folder: Folder) -> tuple[S
     Where the file lets a run find its own length, it is run, and all methods get the longest one.
     Raises StudyError and CaseFileError.
     """
-    of_file = without_keys(overrides, ["solve.method", "solve.rtol"])
+    of_file = frame.without_keys(overrides, ["solve.method", "solve.rtol"])
     (own,) = load_studies(path, overrides=of_file)
     if not all(any(vars(case.clearance_mm).values()) for case in own.cases):
-        raise StudyError(
+        raise frame.StudyError(
             f"{path}: a job of {own.name} has no joint with clearance, so nothing is integrated: "
             "set joint and clearance_mm"
         )
-    settings = [f"name={own.name[: MAX_NAME - len(ENDING)]}{ENDING}", *SETTINGS]
+    settings = [f"name={own.name[: frame.MAX_NAME - len(ENDING)]}{ENDING}", *SETTINGS]
     given = [case.solve.duration_rev for case in own.cases]
     if "auto" in [*given, *(case.solve.settle_rev for case in own.cases)]:
         sweep([own], folder, 1, options=Options(overrides=of_file))
@@ -61,8 +61,8 @@ def load_methods(path: str, overrides: Sequence[str], folder: Folder) -> tuple[S
         settle = max(round(run.attrs.get("settle", 0.0) / case.turn, 6) for case, run in runs)
         duration = max(settle + SETTLED_REV, *(one for one in given if isinstance(one, float)), 0.0)
         settings += [f"solve.duration_rev={duration!r}", f"solve.settle_rev={settle!r}"]
-        overrides = without_keys(overrides, ["solve.duration_rev", "solve.settle_rev"])
-    texts = replace_settings(settings, *overrides)
+        overrides = frame.without_keys(overrides, ["solve.duration_rev", "solve.settle_rev"])
+    texts = frame.replace_settings(settings, *overrides)
     (study,) = load_studies(path, overrides=texts)
     return study, texts
 

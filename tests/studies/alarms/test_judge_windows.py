@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from compressor.studies.alarms.alarms import (
-    StudyError,
     Windows,
     check_draws,
     judge_windows,
@@ -14,6 +13,7 @@ from compressor.studies.alarms.alarms import (
     rank_alarms,
 )
 from compressor.studies.alarms.readings import LADDER, RECORD, band_velocity, read_windows
+from compressor.studies.frame import StudyError
 from compressor.vibration import Record
 
 LEVELS = {0.2: 1.0, 0.3: 2.5, 0.4: 6.0}  # clearance, mm -> rms over the sound one

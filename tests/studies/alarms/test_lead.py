@@ -8,7 +8,8 @@ import xarray as xr
 
 from compressor.cases import Case
 from compressor.store import StoreError, write_dataset
-from compressor.studies.alarms.alarms import StudyError, add_hours, read_wear
+from compressor.studies.alarms.alarms import add_hours, read_wear
+from compressor.studies.frame import StudyError
 from compressor.studies.wear import Worn
 
 CASE = {

@@ -10,12 +10,12 @@ from compressor.studies.find import (
     Goal,
     JobReading,
     Point,
-    StudyError,
     comparison,
     find_extremum,
     find_first,
     goal_of,
 )
+from compressor.studies.frame import StudyError
 
 SCAN = [number / 8 for number in range(9)]
 FAILED = JobReading(reason="the job failed, budget_steps: more than 5 steps")

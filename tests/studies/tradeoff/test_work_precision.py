@@ -8,8 +8,8 @@ from compressor.program import no_progress
 from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.pictures import render
 from compressor.solve.simulate import simulate
+from compressor.studies.frame import StudyError
 from compressor.studies.tradeoff.work_precision import (
-    StudyError,
     draw_work_precision,
     fastest,
     load_methods,
