@@ -13,8 +13,7 @@ from compsim import options, screen
 @options.results
 @options.output("Write this file: .nc or .csv.", required=True, metavar="FILE", type=options.FILE)
 @click.option("--force", is_flag=True, help="Replace a file that exists.")
-@options.units("SI")
-def export(names, folder, output, force, units) -> int:
+def export(names, folder, output, force) -> int:
     """Write results as a file that other programs read.
 
     \b
@@ -23,13 +22,13 @@ def export(names, folder, output, force, units) -> int:
 
     A STUDY becomes a table of its jobs, failed and missing ones included; several, and all
     without a name, become one table. A JOB, named by the beginning of its key, becomes a table of
-    samples, in CSV with its sensor's record. --units is of CSV alone: netCDF and records are in SI.
+    samples, in CSV with its sensor's record. Numbers are in SI.
     """
     from compressor.store import export as write
     from compressor.store import writable_folder
 
     writable_folder(os.path.dirname(output) or os.curdir, make=False)
-    rows, what = write(folder, names, output, force, units or "si")
+    rows, what = write(folder, names, output, force)
     size = screen.size(os.path.getsize(output))
     screen.print_text(f"{output}  {plural(rows, what)}, {size}")
     return screen.DONE

@@ -22,7 +22,6 @@ from compressor.store.netcdf import encode_dataset
 from compressor.store.sensor_records import job_record
 from compressor.store.stored import Stored, read_store
 from compressor.store.studies import StoredStudy, find_study, read_studies, whole_key
-from compressor.units import Units, unit_in
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,51 +31,47 @@ HEXADECIMAL = re.compile("[0-9a-f]{1,20}")
 
 
 def export(
-    folder: Folder, names: Sequence[str], output: Folder, force: bool = False, units: Units = "si"
+    folder: Folder, names: Sequence[str], output: Folder, force: bool = False
 ) -> tuple[int, str]:
     """Write a file of studies, a row a job, or of one job, a row a sample; return its rows.
 
     With what a row is. names: of studies, all without; or the beginning of the job's key. output:
-    .nc or .csv. force: replace what is there; units: of CSV, netCDF is in SI. Raises WrongName for
-    a file that does not fit, and StoreError where the store or the disk gives way.
+    .nc or .csv. force: replace what is there. Raises WrongName for a file that does not fit, and
+    StoreError where the store or the disk gives way.
     """
     path, stored, known = Path(output), read_store(folder, warn=True), read_studies(folder)
-    _check_target(path, force, units)
+    _check_target(path, force)
     keys = {name for name in names if HEXADECIMAL.fullmatch(name)} - {one.name for one in known}
     if keys and len(names) > 1:
         problem = "has studies, or one job"
         raise WrongName(path, problem, "export each job to a file of its own")
     if keys:
         key = whole_key(folder, names[0], known, stored.keys())
-        what, (rows, data) = "sample", _encode_job(stored, key, path.suffix, units)
+        what, (rows, data) = "sample", _encode_job(stored, key, path.suffix)
     else:
         studies = [find_study(folder, name, known) for name in dict.fromkeys(names)] or known
         rows, what = sum(study.jobs for study in studies), "job"
-        data = stored.use(lambda sound: _encode_studies(sound, studies, path.suffix, units))
+        data = stored.use(lambda sound: _encode_studies(sound, studies, path.suffix))
     publish(path, data)
     return rows, what
 
 
-def _check_target(path: Path, force: bool, units: Units) -> None:
-    """Raise WrongName where a file may not be written, or not in these units."""
+def _check_target(path: Path, force: bool) -> None:
+    """Raise WrongName where a file may not be written."""
     if path.suffix not in SUFFIXES:
         problem = f"no files of the type {path.suffix}" if path.suffix else "no folders"
         raise WrongName(path, f"{problem} are written", f"end the name in {' or '.join(SUFFIXES)}")
-    if units == "plant" and path.suffix != ".csv":
-        raise WrongName(path, "plant units are of CSV alone", "leave out --units")
     if os.path.lexists(path) and not force:
         raise WrongName(path, "exists", "--force replaces it")
 
 
-def _encode_studies(
-    stored: Stored, studies: Sequence[StoredStudy], suffix: str, units: Units
-) -> bytes:
+def _encode_studies(stored: Stored, studies: Sequence[StoredStudy], suffix: str) -> bytes:
     """Return the numbers of studies' jobs as one table; in netCDF a lone grid keeps its axes."""
     from compressor.store import dataset as datasets  # loads xarray: half a second
 
     if suffix == ".csv":
         table = datasets.label_jobs(datasets.lay_out_jobs(studies), stored)
-        return encode_csv(columns(table, "job", units))
+        return encode_csv(columns(table, "job"))
     fields = ("name", "case_file", "fixed", "command", "versions", "written")
     origin = [{name: getattr(study, name) for name in fields} for study in studies]
     table = datasets.label_jobs(datasets.lay_out(studies), stored).assign_attrs(
@@ -91,7 +86,7 @@ def _encode_studies(
     return encode_dataset(table)
 
 
-def _encode_job(stored: Stored, key: str, suffix: str, units: Units) -> tuple[int, bytes]:
+def _encode_job(stored: Stored, key: str, suffix: str) -> tuple[int, bytes]:
     """Return how many rows a job's file has, and its bytes."""
     position = stored.position(key)
     if position is None:
@@ -101,7 +96,7 @@ def _encode_job(stored: Stored, key: str, suffix: str, units: Units) -> tuple[in
         raise WrongName(stored.folder, f"job {key} has no time series", remedy)
     if suffix == ".nc":
         return samples, encode_dataset(stored.job(key))
-    table = columns(stored.job(key), "time", units)
+    table = columns(stored.job(key), "time")
     if found := job_record(stored, key):
         from compressor.vibration import record_columns  # loads parts of SciPy
 
@@ -109,10 +104,10 @@ def _encode_job(stored: Stored, key: str, suffix: str, units: Units) -> tuple[in
     return samples, encode_csv(table)
 
 
-def columns(table: "xr.Dataset", dim: str, units: Units = "si") -> dict[str, np.ndarray]:
+def columns(table: "xr.Dataset", dim: str) -> dict[str, np.ndarray]:
     """Return the variables along a dimension by header, a column for each joint, axis and so on.
 
-    units: of the numbers; swept keys stay in those of the case file.
+    Swept keys stay in the units of the case file.
     """
     found = {}
     leading = [name for name in table.coords if table[name].dims == (dim,)]
@@ -121,13 +116,9 @@ def columns(table: "xr.Dataset", dim: str, units: Units = "si") -> dict[str, np.
         if item.dims[:1] != (dim,):
             continue
         unit = item.attrs.get("units", "1")
-        is_key, factor = "case_key" in item.attrs, 1.0
-        if units == "plant" and not is_key:
-            unit, factor = unit_in(unit, units)
-        ending = "" if unit == "1" or is_key else f" [{unit}]"
+        ending = "" if unit == "1" or "case_key" in item.attrs else f" [{unit}]"
         inner = [table[other].values.tolist() for other in item.dims[1:]]
         values = item.values.reshape(len(item), -1)
-        values = values if factor == 1.0 else factor * values
         for number, labels in enumerate(itertools.product(*inner)):
             found["_".join(map(str, (name, *labels))) + ending] = values[:, number]
     return found

@@ -70,23 +70,6 @@ def test_metrics_in_csv_are_the_stored_ones_to_the_bit(results, tmp_path):
     assert sorted(row["status"] for row in rows) == ["failed", "failed", "missing", "ok"]
 
 
-def test_csv_may_have_plant_units(results, tmp_path):
-    """Swept keys stay in those of the case file."""
-    export(results, ["grid"], tmp_path / "grid.csv", units="plant")
-    row = table(tmp_path / "grid.csv")[1]
-    study = open_study(results, "grid")
-    one = study.isel(clearance_mm=0, max_steps=1)
-    assert row["clearance_mm"] == "0.1"
-    for name, header, factor in (
-        ("peak_acceleration", "peak_acceleration [g]", 1 / 9.80665),
-        ("rms_acceleration_error", "rms_acceleration_error [g]", 1 / 9.80665),
-        ("crank_work", "crank_work [J]", 1.0),
-    ):
-        assert float(row[header]) == pytest.approx(factor * float(one[name]), rel=1e-12)
-    force = float(one["peak_contact_force"].sel(joint="big_end"))
-    assert float(row["peak_contact_force_big_end [kN]"]) == pytest.approx(force / 1e3, rel=1e-12)
-
-
 def test_metrics_in_netcdf_open_as_the_study(results, tmp_path):
     export(results, ["grid"], tmp_path / "grid.nc")
     study = open_study(results, "grid")
@@ -142,21 +125,20 @@ def stored(results, key):
 
 
 @pytest.mark.parametrize(
-    ("names", "file", "more", "message"),
+    ("names", "file", "message"),
     [
-        (["grid", "KEY"], "x.nc", {}, "x.nc: has studies, or one job; export each job to a file"),
-        (["grid"], "x.nc", {"units": "plant"}, "plant units are of CSV alone"),
-        (["grid"], "x.xls", {}, r"no files of the type .xls are written; end the name in .nc or"),
-        (["grid"], "x", {}, "no folders are written; end the name in .nc or .csv"),
-        (["grid"], "grid.csv", {}, "grid.csv: exists; --force replaces it"),
+        (["grid", "KEY"], "x.nc", "x.nc: has studies, or one job; export each job to a file"),
+        (["grid"], "x.xls", r"no files of the type .xls are written; end the name in .nc or"),
+        (["grid"], "x", "no folders are written; end the name in .nc or .csv"),
+        (["grid"], "grid.csv", "grid.csv: exists; --force replaces it"),
     ],
 )
-def test_what_does_not_fit_is_refused(results, names, file, more, message, tmp_path):
+def test_what_does_not_fit_is_refused(results, names, file, message, tmp_path):
     key = open_study(results, "list").key.values[0]
     names = [key if name == "KEY" else name for name in names]
     (tmp_path / "grid.csv").touch()
     with pytest.raises(WrongName, match=message):
-        export(results, names, tmp_path / file, **more)
+        export(results, names, tmp_path / file)
     assert [path.name for path in tmp_path.iterdir()] == ["grid.csv"]
     export(results, ["grid"], tmp_path / "grid.csv", force=True)
     assert len(table(tmp_path / "grid.csv")) == 4
