@@ -22,72 +22,48 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from compressor.program import VERSION as __version__
-from compressor.program import CompsimError, CompsimWarning
+from compressor.program import CompsimError as CompsimError
+from compressor.program import CompsimWarning as CompsimWarning
 
 if TYPE_CHECKING:
-    from compressor.cases import (
-        Body,
-        Case,
-        CaseError,
-        CaseFileError,
-        Contact,
-        Drive,
-        Friction,
-        Gas,
-        Guide,
-        Lubricant,
-        Machine,
-        Offset,
-        Output,
-        PerJoint,
-        Rod,
-        Sensor,
-        Solve,
-        Spring,
-        Wear,
-        load_cases,
-    )
-    from compressor.solve import simulate
-    from compressor.store import StoreError, StoreWarning, open_study, read_job
+    from compressor.cases import Body as Body
+    from compressor.cases import Case as Case
+    from compressor.cases import CaseError as CaseError
+    from compressor.cases import CaseFileError as CaseFileError
+    from compressor.cases import Contact as Contact
+    from compressor.cases import Drive as Drive
+    from compressor.cases import Friction as Friction
+    from compressor.cases import Gas as Gas
+    from compressor.cases import Guide as Guide
+    from compressor.cases import Lubricant as Lubricant
+    from compressor.cases import Machine as Machine
+    from compressor.cases import Offset as Offset
+    from compressor.cases import Output as Output
+    from compressor.cases import PerJoint as PerJoint
+    from compressor.cases import Rod as Rod
+    from compressor.cases import Sensor as Sensor
+    from compressor.cases import Solve as Solve
+    from compressor.cases import Spring as Spring
+    from compressor.cases import Wear as Wear
+    from compressor.cases import load_cases as load_cases
+    from compressor.solve import simulate as simulate
+    from compressor.store import StoreError as StoreError
+    from compressor.store import StoreWarning as StoreWarning
+    from compressor.store import open_study as open_study
+    from compressor.store import read_job as read_job
 
-__all__ = [
-    "Body",
-    "Case",
-    "CaseError",
-    "CaseFileError",
-    "CompsimError",
-    "CompsimWarning",
-    "Contact",
-    "Drive",
-    "Friction",
-    "Gas",
-    "Guide",
-    "Lubricant",
-    "Machine",
-    "Offset",
-    "Output",
-    "PerJoint",
-    "Rod",
-    "Sensor",
-    "Solve",
-    "Spring",
-    "StoreError",
-    "StoreWarning",
-    "Wear",
-    "__version__",
-    "load_cases",
-    "open_study",
-    "read_job",
-    "simulate",
-]
-
-HOMES = {  # of what is not in `cases`
-    "simulate": "solve",
-    "open_study": "store",
-    "read_job": "store",
-    "StoreError": "store",
-    "StoreWarning": "store",
-}
+# names that are imported when they are first used, by package
+HOMES = {
+    "cases": (
+        "Body", "Case", "CaseError", "CaseFileError", "Contact", "Drive", "Friction", "Gas",
+        "Guide", "Lubricant", "Machine", "Offset", "Output", "PerJoint", "Rod", "Sensor", "Solve",
+        "Spring", "Wear", "load_cases",
+    ),
+    "solve": ("simulate",),
+    "store": ("StoreError", "StoreWarning", "open_study", "read_job"),
+}  # fmt: skip
+HOME = {name: package for package, names in HOMES.items() for name in names}
+__all__ = ["CompsimError", "CompsimWarning", "__version__", *HOME]
 
 
 def __dir__() -> list[str]:
@@ -97,6 +73,6 @@ def __dir__() -> list[str]:
 if not TYPE_CHECKING:  # a type checker would take any name for one of ours
 
     def __getattr__(name):
-        if name not in __all__:
+        if name not in HOME:
             raise AttributeError(f"module 'compressor' has no attribute {name!r}")
-        return getattr(import_module(f"compressor.{HOMES.get(name, 'cases')}"), name)
+        return getattr(import_module(f"compressor.{HOME[name]}"), name)
