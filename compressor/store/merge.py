@@ -1,6 +1,7 @@
 """Keep a folder of results tidy: merge small batches, set damaged ones aside."""
 
 import contextlib
+import math
 from collections import defaultdict
 from pathlib import Path
 
@@ -11,10 +12,11 @@ from compressor.store.files import Folder, discard_leftovers, refusals
 from compressor.store.netcdf import DamagedFile
 from compressor.store.stored import read_store
 
-MAX_JOBS, MAX_BYTES = 4096, 32_000_000  # of a merged batch; one with a quarter of either is small
+MAX_JOBS, MAX_BYTES = 4096, 32_000_000  # of a merged batch
+SMALL = 0.25  # part of either, below which a batch is small
 MAX_SMALL = 8  # small batches that may stay
 
-Counting = tuple[Path, list[int]]  # a batch, and its rows that count
+Counting = tuple[Path, list[int], float]  # a batch, its rows that count, its part of a merged one
 
 
 def merge_batches(folder: Folder) -> None:
@@ -32,17 +34,15 @@ def merge_batches(folder: Folder) -> None:
         for damage in stored.damaged:
             set_aside(Path(damage.path))
         paths, source, row = stored.places
-        small: dict[object, list[Counting]] = defaultdict(list)
+        small: dict[int, list[Counting]] = defaultdict(list)
         for number, path in enumerate(paths):
             mine = np.flatnonzero(source == number)
+            share = _share(path, mine.size)
             if not mine.size:
                 path.unlink(missing_ok=True)
-            elif mine.size < MAX_JOBS // 4 and 0 < _size(path) < MAX_BYTES // 4:
-                # of one length and kind, lest time series grow
-                kept = {*stored.columns["kept"][mine].tolist()}
-                kinds = {(b"double" in k, b"compressed" in k) for k in kept if b"series" in k}
-                length = int(stored.columns["samples"][mine].max())
-                small[length, frozenset(kinds)].append((path, np.sort(row[mine]).tolist()))
+            elif share < SMALL:
+                length = int(stored.columns["samples"][mine].max())  # alike, lest series grow
+                small[length].append((path, np.sort(row[mine]).tolist(), share))
         if sum(map(len, small.values())) > MAX_SMALL:
             for alike in small.values():
                 _merge_alike(folder, alike)
@@ -54,33 +54,29 @@ def set_aside(path: Path) -> None:
         path.rename(f"{path}.damaged")
 
 
-def _size(path: Path) -> int:
-    """Return the bytes of a batch; 0 where another run has merged it."""
+def _share(path: Path, jobs: int) -> float:
+    """Return the part of a merged batch that a batch makes; inf where another run has merged it."""
     with contextlib.suppress(FileNotFoundError):
-        return path.stat().st_size
-    return 0
+        return max(jobs / MAX_JOBS, path.stat().st_size / MAX_BYTES)
+    return math.inf
 
 
 def _merge_alike(folder: Path, batches: list[Counting]) -> None:
     """Merge batches in groups that are large enough."""
-    group: list[Counting] = []
-    jobs = size = 0
-    for number, (path, rows) in enumerate(batches, 1):
-        group.append((path, rows))
-        jobs, size = jobs + len(rows), size + _size(path)
-        if jobs >= MAX_JOBS or size >= MAX_BYTES or number == len(batches):
-            if len(group) > 1:
-                _merge_group(folder, group)
-            group, jobs, size = [], 0, 0
+    numbers = np.cumsum([share for *_, share in batches]).astype(int)  # of each one's group
+    for number in np.unique(numbers):
+        group = [one for one, its in zip(batches, numbers, strict=True) if its == number]
+        if len(group) > 1:
+            _merge_group(folder, group)
 
 
 def _merge_group(folder: Path, group: list[Counting]) -> None:
     """Write one batch in place of several, unless one is damaged, gone or of another version."""
     outcomes = []
     with contextlib.suppress(DamagedFile, FileNotFoundError):
-        for path, rows in group:
+        for path, rows, _ in group:
             found = read_outcomes(path)
             outcomes += [found[row] for row in rows]
         publish_batch(folder, encode_batch(outcomes), group[-1][0].name[:20])
-        for path, _ in group:
+        for path, *_ in group:
             path.unlink(missing_ok=True)
