@@ -255,8 +255,8 @@ def stored(text: str) -> dict[str, str]:
     found["worn"] = Case.from_attribute(run.attrs["case"]).worn_joint
     if case.output.keep == "metrics":
         return {name: text for name, text in found.items() if name != "time"}
-    # of its time series: the text of the case is longer by the key
-    found["file"] = str(round(len(encode_batch([outcome_of(run)])) / 10_000))
+    if case.steps > 1000:  # of long series: the text of the case is longer by the key
+        found["file"] = str(round(len(encode_batch([outcome_of(run)])) / 10_000))
     if case.wear:
         worn = Worn(case)
         begun = worn.make_row([])
