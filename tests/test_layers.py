@@ -6,6 +6,8 @@ functions and for types alone; a planted fault shows that a rule bites.
 
 import ast
 import re
+import subprocess
+import sys
 import tomllib
 from fnmatch import fnmatch
 from functools import cache
@@ -164,3 +166,26 @@ def test_every_package_is_installed():
     doors = [*(ROOT / "compressor").rglob("__init__.py"), ROOT / "cmd" / "compsim" / "__init__.py"]
     parts = (door.parent.relative_to(ROOT).parts for door in doors)
     assert sorted(listed) == sorted(".".join(p[p[0] == "cmd" :]) for p in parts)
+
+
+LOOK = (  # before each run: numba and xarray took it 0.8 s
+    "from compressor.analysis import cautions, describe_machine; "
+    "from compressor.cases import load_studies, templates; "
+    "study = load_studies(templates()['machine'].path)[0]; cautions(study); describe_machine(study)"
+)
+
+
+@pytest.mark.parametrize(
+    ("code", "heavy"),
+    [
+        ("import compsim.cli", "numpy xarray scipy numba h5py joblib matplotlib yaml"),
+        ("import compressor.cases.load", "numpy scipy numba"),
+        ("import compressor.solve", "xarray pandas scipy numba"),  # in each worker
+        (LOOK, "xarray scipy numba"),
+        ("import compressor.report.figures", "matplotlib.pyplot"),
+    ],
+)
+def test_nothing_heavy_is_loaded_before_it_is_needed(code, heavy):
+    ask = f"import sys; {code}; print({{*{heavy.split()}}} & {{*sys.modules}})"
+    run = [sys.executable, "-c", ask]
+    assert subprocess.run(run, capture_output=True, text=True, check=True).stdout == "set()\n"

@@ -2,8 +2,6 @@
 
 import json
 import math
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -263,20 +261,6 @@ def test_loads_in_plain_python_are_those_of_the_machine_code(gas, read, tmp_path
     np.testing.assert_allclose(loads.rod, rows[:, Column.FORCE + 2], atol=1e-6)
     sizes = rows[:, Column.FORCE_SIZE : Column.FORCE_SIZE + 2]
     np.testing.assert_allclose(loads.sizes, sizes, atol=1e-6)
-
-
-def test_a_case_file_is_looked_at_without_machine_code_or_xarray(tmp_path):
-    """The program does it before each run; numba and xarray took it 0.8 s."""
-    path = tmp_path / "machine.yaml"
-    path.write_text(NAMEPLATE, encoding="utf-8")
-    code = (
-        "import sys; from compressor.analysis import cautions, describe_machine\n"
-        "from compressor.cases import load_studies\n"
-        f"study = load_studies({str(path)!r})[0]; cautions(study); describe_machine(study)\n"
-        "print([name for name in ('numba', 'scipy', 'xarray') if name in sys.modules])"
-    )
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert found.stdout == "[]\n"
 
 
 def test_features_and_clearance_leave_the_sound_machine_as_it_is():

@@ -2,8 +2,6 @@
 
 import itertools
 import os
-import subprocess
-import sys
 import time
 
 import pytest
@@ -317,19 +315,6 @@ def test_any_override_is_read_or_refused(write, text):
 
 
 # The table, and the house
-
-
-@pytest.mark.parametrize(
-    ("module", "heavy"),
-    [
-        ("compressor.cases.load", {"numpy", "scipy", "numba"}),
-        ("compressor.solve", {"xarray", "pandas", "scipy", "numba"}),  # in each worker
-    ],
-)
-def test_no_heavy_library_is_loaded_before_it_is_needed(module, heavy):
-    code = f"import sys, {module}; print({heavy} & set(sys.modules))"
-    run = [sys.executable, "-c", code]
-    assert subprocess.run(run, capture_output=True, text=True, check=True).stdout == "set()\n"
 
 
 def test_paths_may_be_of_any_kind(write, tmp_path):
