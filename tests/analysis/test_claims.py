@@ -8,10 +8,8 @@ from compressor.analysis.margins import Shares, least
 from compressor.analysis.runs import (
     CLEARANCES,
     FAULT_LABELS,
-    case_of,
     force_relation,
     ideal_motion,
-    paper_cases,
     settled_part,
 )
 
@@ -24,13 +22,6 @@ def run(paper_runs):
 
 def judged(runs, number):
     return claims(runs)[number - 1]
-
-
-def test_eleven_cases_in_the_paper():
-    cases = paper_cases()
-    assert len(cases) == 11
-    assert len({case.key for case in cases.values()}) == 11
-    assert paper_cases(rod_mass_kg=3)["both 0.1"].machine.rod_mass_kg == 3
 
 
 def test_settled_leaves_out_the_first_revolution(run):
@@ -157,8 +148,3 @@ def test_margins_of_claims_are_those_of_the_page(paper_runs):
         assert claim.held is (margin.value >= 0.0)
         assert margin.error >= 0.0
         assert claim.measured
-
-
-def test_the_case_of_a_run_is_recovered(paper_runs):
-    cases = paper_cases()
-    assert case_of(paper_runs["both 0.3"]).physics_key == cases["both 0.3"].physics_key

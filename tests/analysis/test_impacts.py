@@ -87,7 +87,3 @@ def test_sampling_errs_by_little(fine):
     assert len(coarse) == len(exact) > 0
     for name, error in {"time": 1e-8, "approach_speed": 5e-5}.items():
         np.testing.assert_allclose(column(coarse, name), column(exact, name), rtol=error)
-
-
-def test_the_paper_s_runs_have_no_impacts(paper_runs):
-    assert impacts(paper_runs["both 0.2"]) == []

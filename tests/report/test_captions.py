@@ -92,15 +92,6 @@ def test_forces_are_those_of_the_joint(paper_runs, number, where):
         assert told(found, words) == pytest.approx(peaks, rel=1e-3)
 
 
-def test_slopes_are_those_of_the_fits(paper_runs):
-    for number, joint in ((10, "big_end"), (13, "small_end")):
-        kept = paper_runs[label(joint, 0.2)].isel(time=slice(1200, None))
-        a = kept["acceleration"].values
-        force = kept["contact_force"].sel(joint=joint, axis="x").values
-        slope = np.cov(a, force)[0, 1] / np.var(a, ddof=1)
-        assert told(shown(number, paper_runs), "slope")[1] == pytest.approx(slope, rel=1e-3)
-
-
 def test_loads_are_told_by_their_peaks_and_corners(paper_runs):
     found = shown(7, paper_runs)
     assert told(found, "force of the spring") == [3.345]
