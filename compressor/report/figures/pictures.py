@@ -5,6 +5,7 @@ user's matplotlibrc nor a user's own figures are touched.
 """
 
 import contextlib
+import gc
 import io
 import itertools
 import multiprocessing
@@ -114,6 +115,7 @@ TO_DRAW: list[Callable[[], Any]] = []  # of a copy of this process
 def start_copy(work: Work[Any]) -> None:
     """Prepare a copy: pickled to it, a figure would lose its arrays. Ctrl-C ends it silently."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    gc.freeze()  # else each collection looks at what lives as long as the copy
     TO_DRAW[:] = work
 
 
