@@ -246,9 +246,3 @@ def test_a_clearance_of_0_reads_back():
         case = Case.from_values(values)
         assert Case.from_attribute(case.attributes()["case"]) == case
         assert Case.from_values(case.values()).key == case.key
-
-
-def test_a_sensor_s_rate_in_kilohertz_is_refused():
-    """Its record had no sample, and the job ended as an internal error."""
-    with pytest.raises(CaseError, match=r"sensor.rate_Hz: 25.6 Hz are 3.07 samples a revolution"):
-        Case.from_values({"body": True, "sensor": {"rate_Hz": 25.6}})

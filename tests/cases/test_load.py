@@ -261,14 +261,6 @@ def test_a_hostile_file_is_refused_soon(write, text, end):
     assert time.process_time() - start < 30  # about 2 s on one slow core
 
 
-@pytest.mark.parametrize(
-    "text", ['"\\e[31m": 1', 'name: "\\e]0;owned\\a"', 'load: ["\\u202E"]', '"\\uD800": 1']
-)
-def test_a_hostile_file_cannot_write_to_the_terminal(write, text):
-    (message,) = mistakes(write(text))
-    assert message.isprintable()
-
-
 def test_a_hostile_file_name_cannot_either(write):
     assert mistakes("\x1b[31m.yaml") == [
         "\\x1b[31m.yaml: cannot be read: No such file or directory; "

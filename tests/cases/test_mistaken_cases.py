@@ -65,6 +65,7 @@ def settings(values, before=""):
 @pytest.mark.parametrize(("text", "lines", "ways"), ROWS)
 def test_a_mistake_is_answered_with_place_key_and_remedy(text, lines, ways, tmp_path):
     assert told(text, tmp_path) == lines
+    assert all(line.isprintable() for line in lines)  # nothing that steers a terminal
     if "values" in ways:
         assert without_places(refusal(values_of(text))) == without_places(lines)
     if "set" in ways:

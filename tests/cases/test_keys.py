@@ -1,4 +1,4 @@
-"""Pins of the machine that is there: a radius each, their contact, and what is told of it."""
+"""Keys of pins, cylinders and healthy clearances, and their words of the trade."""
 
 import json
 import math
@@ -7,11 +7,16 @@ from dataclasses import replace
 import pytest
 
 from compressor.cases.case import Case, CaseError
+from compressor.cases.checks import DOUBLES
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.materials import composite_modulus, contact_stiffness
 from compressor.cases.parameter import PerJoint
+from compressor.cases.study import Axis
 from compressor.physics.film import film
 from compressor.solve.si_record import record
+
+# ---- pins: a radius each, their contact and their bearings
+
 
 WORN = {"joint": "both", "clearance_mm": 0.2}
 MATERIALS = {"materials": ["steel", "copper"]}
@@ -123,17 +128,118 @@ def test_files_have_a_pair_for_each_pin_and_sweep_lengths(tmp_path):
     assert {one.contact.materials.small_end for one in study.cases} == {("steel", "copper")}
 
 
-def test_what_is_wrong_with_one_bearing_is_told_of_it():
-    lengths = {"big_end": 60, "small_end": 80}  # beyond the pin's diameter
-    with pytest.raises(CaseError, match=r"bearing_length_mm.small_end: is 1\.14 times"):
-        case(machine=PINS, lubricant={"bearing_length_mm": lengths})
+# ---- cylinders: what may be left out, and keys of jobs that stay
 
 
-def test_a_default_length_is_refused_as_a_default():
-    """It was told as 0.105 times the pin for a key that nobody wrote."""
-    with pytest.raises(CaseError) as caught:
-        case(machine={"pin_radius_mm": 95}, lubricant={"viscosity_mPa_s": 48})
-    (problem,) = caught.value.problems
-    assert problem.key == "lubricant.bearing_length_mm"
-    remedy = "20 mm is the default, of the paper's pin: give the length that bears"
-    assert problem.message.endswith(remedy)
+DOUBLE = {"action": "double", "rod_diameter_mm": 30}
+
+
+def cylinder(gas):
+    return Case.from_values({"load": "gas", "gas": gas})
+
+
+def test_what_is_so_by_default_makes_no_other_job():
+    whole = {"unloaded": "none", "valve_loss_percent": 0, "switching": "exact"}
+    assert cylinder(DOUBLE).key == cylinder(DOUBLE | whole).key
+    for key, parts in (("clearance_percent", ("head", "crank")),
+                       ("valve_loss_percent", ("suction", "discharge"))):  # fmt: skip
+        assert (
+            cylinder(DOUBLE | {key: 12}).key
+            == cylinder(DOUBLE | {key: dict.fromkeys(parts, 12)}).key
+        )
+    assert cylinder({"unloaded": "none"}).key == cylinder({"action": "single"}).key
+
+
+def test_clearances_are_of_the_stroke():
+    """240 mm here; the crank end has the head's millimetres where nothing else is given."""
+    found = record(cylinder(DOUBLE | {"clearance_percent": {"head": 10, "crank": 12.5}}))
+    assert (found.head_clearance, found.crank_clearance) == pytest.approx((0.024, 0.03))
+    found = record(cylinder(DOUBLE))
+    assert (found.head_clearance, found.crank_clearance) == (0.02, 0.02)
+    found = record(cylinder(DOUBLE | {"clearance_percent": {"crank": 12.5}}))
+    assert (found.head_clearance, found.crank_clearance) == pytest.approx((0.02, 0.03))
+
+
+@pytest.mark.parametrize("clearance", [14, {"crank": 14}, {"head": 12, "crank": 14}])
+def test_a_crank_end_alone_takes_its_clearance_in_every_form(clearance):
+    """Facts of a cylinder: two of the forms were refused, with opposite advice."""
+    one = cylinder({"action": "crank_end", "rod_diameter_mm": 20, "clearance_percent": clearance})
+    assert record(one)["crank_clearance"] == pytest.approx(0.14 * 0.24)
+    both = {"head": 12, "crank": 14}
+    single = cylinder({"action": "single", "clearance_percent": both})
+    assert record(single)["head_clearance"] == pytest.approx(0.0288)
+
+
+# ---- a joint with no more than a healthy clearance is sound
+
+
+BOTH = {"joint": "both", "clearance_mm": {"big_end": 0.08, "small_end": 0.25}}
+
+
+@pytest.mark.parametrize(
+    ("healthy", "worn"),
+    [(None, "both"), (0, "both"), (0.07, "both"), (0.08, "small_end"), (0.25, "none"),
+     ({"big_end": 0.1}, "small_end"), ({"small_end": 0.3}, "big_end"),
+     ({"big_end": 0.1, "small_end": 0.3}, "none")],
+)  # fmt: skip
+def test_a_joint_is_worn_beyond_its_healthy_clearance(healthy, worn):
+    named = {} if healthy is None else {"healthy_clearance_mm": healthy}
+    case = Case.from_values(BOTH | named)
+    assert case.worn_joint == worn
+    assert case.key == Case.from_values(BOTH).key
+    assert case.physics_key == Case.from_values(BOTH).physics_key
+    assert Case.from_values(case.values()) == case
+    assert Case.from_attribute(case.attributes()["case"]) == case
+
+
+@pytest.mark.parametrize("joint", ["none", "big_end"])
+def test_joints_that_are_ideal_are_never_worn(joint):
+    clearance = {} if joint == "none" else {"clearance_mm": 0.2}
+    case = Case.from_values({"joint": joint, **clearance, "healthy_clearance_mm": 0.1})
+    assert case.worn_joint == joint
+
+
+# ---- doubles of our keys are read, in any form
+
+
+@pytest.mark.parametrize("word", DOUBLES)
+def test_a_word_of_the_trade_is_twice_a_key(word):
+    group, _, name = word.partition(".")
+    own = DOUBLES[word].partition(".")[2]
+    more = {"load": "gas"} if group == "gas" else {}
+    one = Case.from_values(more | {group: {name: 250}})
+    assert one == Case.from_values(more | {group: {own: 125}})
+    assert getattr(getattr(one, group), own) == 125.0
+    assert own in one.values()[group]
+    assert name not in one.values()[group]
+
+
+@pytest.mark.parametrize(
+    ("swept", "radii"),
+    [
+        ("180", None),
+        ("[160, 200]", (80.0, 100.0)),
+        ("{linspace: [160, 200, 3]}", (80.0, 90.0, 100.0)),
+        ("{range: [160, 200, 20]}", (80.0, 90.0, 100.0)),
+        ("{logspace: [100, 200, 2]}", (50.0, 100.0)),
+    ],
+)
+def test_a_stroke_is_swept_as_a_radius(read, swept, radii):
+    study = read(f"machine: {{stroke_mm: {swept}}}\nload: none")
+    assert study.axes == ((Axis("machine.crank_radius_mm", radii),) if radii else ())
+    overridden = read("load: none\nmachine: {crank_radius_mm: 3}", f"machine.stroke_mm={swept}")
+    assert overridden.keys == study.keys
+
+
+def test_draws_lie_between_halves(read):
+    study = read("load: none\nmachine: {stroke_mm: {lhs: [160, 200]}}\nsample: {n: 4}")
+    assert all(80 <= case.machine.crank_radius_mm <= 100 for case in study.cases)
+
+
+def test_a_block_and_the_command_line_replace_either_word(read):
+    study = read(
+        "load: none\nmachine: {crank_radius_mm: 90}\nblocks: [{machine: {stroke_mm: 200}}]"
+    )
+    assert study.cases[0].machine.crank_radius_mm == 100
+    study = read("load: none\nmachine: {stroke_mm: 200}", "machine.crank_radius_mm=80")
+    assert study.cases[0].machine.crank_radius_mm == 80
