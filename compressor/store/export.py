@@ -51,7 +51,7 @@ def export(
     else:
         studies = [find_study(folder, name, known) for name in dict.fromkeys(names)] or known
         rows, what = sum(study.jobs for study in studies), "job"
-        data = stored.use(lambda sound: _encode_studies(sound, studies, path.suffix))
+        data = _encode_studies(stored, studies, path.suffix)
     publish(path, data)
     return rows, what
 

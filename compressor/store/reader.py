@@ -1,6 +1,5 @@
 """Stored jobs and studies as Datasets."""
 
-import os
 import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -55,7 +54,7 @@ def open_study(folder: Folder, name: str | None = None) -> "xr.Dataset":
 
     Raises StoreError for a folder without results and for a study that it does not hold: a
     WrongName, which says what was probably meant. Of damaged files a StoreWarning is given, and
-    their jobs count as missing.
+    their jobs count as missing; where numbers alone are damaged, a StoreError names the file.
 
     After `compsim run wear.yaml` with the file of `load_cases`:
 
@@ -70,12 +69,10 @@ def open_study(folder: Folder, name: str | None = None) -> "xr.Dataset":
     >>> study.acceleration.sel(clearance_mm=0.3).dims
     ('time',)
     """
-    folder = os.path.abspath(folder)
     studies = read_studies(folder)
     if name is not None:
         studies = [find_study(folder, name, studies)]
-    stored = read_store(folder, warn=True)
-    dataset = stored.use(lambda sound: label_studies(sound, studies))
+    dataset = label_studies(read_store(folder, warn=True), studies)
     if "fault" in dataset.dims and "joint" in dataset.dims:
         warnings.warn(BOTH_JOINTS, StoreWarning, stacklevel=2)
     return dataset
@@ -87,6 +84,4 @@ def label_studies(stored: Stored, studies: Sequence[StoredStudy]) -> "xr.Dataset
 
     layout = datasets.lay_out(studies)
     found = datasets.label_jobs(layout, stored, with_series=True)
-    found = found.assign(datasets.machine_constants(studies, layout))
-    names = [study.name for study in studies]
-    return found.assign_attrs(folder=os.path.abspath(stored.folder), studies=names)
+    return found.assign(datasets.machine_constants(studies, layout))

@@ -113,19 +113,6 @@ class Stored:
         """Return a word of every job, of `batch.WORDS`, as text, (jobs,)."""
         return self.columns[name].astype(str)
 
-    def use(self, make: Callable[["Stored"], Found]) -> Found:
-        """Return what `make` gives of this store, less batches that it finds to be damaged.
-
-        Each has a StoreWarning. Raises other damage.
-        """
-        try:
-            return make(self)
-        except DamagedFile as damage:
-            if Path(damage.path) not in self.places[0]:
-                raise
-            _warn_of([damage])
-            return read_store(self.folder, damaged=[*self.damaged, damage]).use(make)
-
     # ---- how they ended -------------------------------------------------------------------------
 
     def status(self, key: str) -> JobStatus | None:
@@ -274,33 +261,26 @@ class Stored:
         return xr.Dataset(outcome.table(self.series([position])[0]), attrs=outcome.attributes)
 
 
-def _warn_of(damaged: Sequence[DamagedFile]) -> None:
-    """Give a StoreWarning of each damaged batch."""
-    for damage in damaged:
-        warnings.warn(f"{damage}: its jobs count as missing", StoreWarning, stacklevel=4)
-
-
-def read_store(folder: Folder, warn: bool = False, damaged: Sequence[DamagedFile] = ()) -> Stored:
+def read_store(folder: Folder, warn: bool = False) -> Stored:
     """Return what a folder holds; damaged batches are listed in `damaged`.
 
-    warn: give a StoreWarning of each; damaged: of batches that are not read. Raises StoreError,
-    also where runs change the folder faster than it can be read.
+    warn: give a StoreWarning of each. Raises StoreError, also where runs change the folder faster
+    than it can be read.
     """
-    folder, known = Path(os.path.abspath(folder)), {Path(one.path) for one in damaged}
+    folder = Path(os.path.abspath(folder))
     for _ in range(ATTEMPTS):
-        batches, found = {}, [*damaged]
+        batches, found = {}, []
         try:
             for path in batch_paths(folder):
                 try:
-                    if path not in known:
-                        batches[path] = read_batch(path)
+                    batches[path] = read_batch(path)
                 except DamagedFile as error:
                     found.append(error)
         except FileNotFoundError:
             continue  # merged with others meanwhile
         except OSError as error:
             raise system_error(folder, error) from error
-        if warn:
-            _warn_of(found)
+        for damage in found if warn else ():
+            warnings.warn(f"{damage}: its jobs count as missing", StoreWarning, stacklevel=3)
         return Stored(folder, batches, found)
     raise StoreError(folder, "changes faster than it can be read", "try again")

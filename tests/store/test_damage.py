@@ -198,16 +198,21 @@ def test_damage_to_a_machine_that_was_followed_is_told(tmp_path, compsim):
 
 
 def test_jobs_in_a_damaged_batch_count_as_missing_with_a_warning(tmp_path, compsim):
-    """Where it cannot be opened, and where only its numbers are damaged."""
+    """Where it cannot be opened; where only its numbers are damaged, it is named."""
     parts = [[0], [1], [*range(2, 400)]]  # the values of the last have a checksum of their own
     paths = [write_batch(tmp_path, [made(n) for n in part]) for part in parts]
     plan(tmp_path, 400)
     paths[0].write_bytes(paths[0].read_bytes()[:-1])
-    flip(paths[2], made(2).numbers["peak_contact_force_axis"])
     with pytest.warns(StoreWarning, match="is damaged.*count as missing") as told:
         found = open_study(tmp_path)
-    assert [sum(path.name in str(one.message) for one in told) for path in paths] == [1, 0, 1]
-    assert found.status.values[:3].tolist() == ["missing", "ok", "missing"]
+    assert [sum(path.name in str(one.message) for one in told) for path in paths] == [1, 0, 0]
+    assert found.status.values[:3].tolist() == ["missing", "ok", "ok"]
+    flip(paths[2], made(2).numbers["peak_contact_force_axis"])
+    with (
+        pytest.warns(StoreWarning, match=paths[0].name),
+        pytest.raises(StoreError, match=f"{paths[2].name}: is damaged"),
+    ):
+        open_study(tmp_path)
     stored = read_store(tmp_path)
     assert [stored.intact(stored.position(key(n))) for n in (1, 2, 3)] == [True, False, False]
     told = json.loads(compsim("verify", "-r", tmp_path, "--json", code=5).out)

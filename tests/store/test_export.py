@@ -145,7 +145,7 @@ def test_what_does_not_fit_is_refused(results, names, file, message, tmp_path):
 
 
 def test_damaged_jobs_are_told(results, tmp_path, compsim):
-    """Damaged series are an error; damaged numbers leave their jobs out of a study's table."""
+    """Damaged series are an error; a damaged batch leaves its jobs out of a study's table."""
     copy = tmp_path / "results"
     shutil.copytree(results, copy)
     stored = read_store(copy)
