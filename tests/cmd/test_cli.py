@@ -180,22 +180,16 @@ def test_durations_points_and_sizes(say, thing, text):
 # ---- explain and tradeoff -----------------------------------------------------------------------
 
 
-def test_explain_tells_terms_scales_and_what_is_paid_for(case_file, compsim):
+def test_explain_tells_cost_and_what_is_paid_for(case_file, compsim):
     case_file(
         "two.yaml", joint="big_end", clearance_mm=[0.1, 0.2], machine={"gravity_m_per_s2": 1e-4}
     )
     out, err = compsim("explain", "two.yaml", "-j", "1")
-    assert out.startswith("two: 2 jobs; explained: clearance_mm = 0.2\n  machine    piston  ")
-    assert "\n  motion     clearance at " in out
-    for word in ("active", "absent", "scales", "tolerance", "cost"):
-        assert re.search(rf"^  {word} ", out, re.MULTILINE), word
+    assert out.startswith("two: 2 jobs; explained: clearance_mm = 0.2\nrtol ")
     assert max(map(len, out.splitlines())) <= 80
-    assert "2 degrees of freedom\n" in out
     flat = " ".join(out.split())
     assert "without a feature acceleration force time needed, or below 2 %: can go" in flat
-    assert "big end eccentricity x; big end eccentricity y active" in flat
     assert "for 2 jobs with 1 worker," in flat
-    assert re.search(r" ms of it for the solution .* the rest for the runs that its error", flat)
     assert re.search(r"no gravity \S+ .* machine\.gravity_m_per_s2: 0", flat)
     assert re.search(r"no friction [+-]\S+ % [+-]\S+ % × \S+ needed", flat)
     assert err.startswith(
