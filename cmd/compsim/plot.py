@@ -5,7 +5,7 @@ import click
 from compressor.program import did_you_mean
 from compsim import options, screen
 
-OF_JOB = ["analyst", "loads", "signals", "cards", "spectra", "orbits", "impacts"]
+OF_JOB = ["analyst", "signals", "cards", "spectra", "orbits", "impacts"]
 OF_STUDY = ["cycles", "segments", "waterfall"]
 LISTED = f"of a job {', '.join(OF_JOB)}; of a study {', '.join(OF_STUDY)}"
 

@@ -4,7 +4,7 @@ from compressor.analysis.cam import Cam
 from compressor.analysis.cautions import cautions
 from compressor.analysis.claims import RULES, Claim, claim_margins, claims
 from compressor.analysis.contacts import impacts, joints_with_clearance
-from compressor.analysis.cycle import Cycle, read_cycle, read_loads
+from compressor.analysis.cycle import Cycle, read_cycle
 from compressor.analysis.cylinder import end_states
 from compressor.analysis.effects import Effects, grid_effects, saltelli_design, sampled_effects
 from compressor.analysis.machine_numbers import MachineDescription, describe_cases, describe_machine

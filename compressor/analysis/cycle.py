@@ -11,7 +11,7 @@ import numpy as np
 
 from compressor.analysis.contacts import impacts, joints_with_clearance
 from compressor.analysis.runs import case_of, record_of
-from compressor.analysis.shaking import NoSeriesError, last_revolution, whole_revolutions
+from compressor.analysis.shaking import NoSeriesError, whole_revolutions
 from compressor.physics import segments
 
 if TYPE_CHECKING:
@@ -75,22 +75,6 @@ def read_cycle(run: "xr.Dataset") -> Cycle:
         angle, vibration, recorded is not None, load_angle, sorted_load,
         find_reversals(turns[inside], load), find_events(run, begin), find_impacts(run, begin),
     )  # fmt: skip
-
-
-def read_loads(run: "xr.Dataset") -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return crank angles (degrees) of the last settled revolution, and the loads there, N.
-
-    By name, (m,) each, along the cylinder and positive in tension: `gas` on the piston (or the
-    spring's), `inertia` of what reciprocates, `rod` at the crosshead pin. Of a rigid crosshead in
-    a guide without friction the last is the sum of the others.
-    """
-    degrees, revolution = last_revolution(run)
-    mass = case_of(run).machine.reciprocating_mass_kg
-    return degrees, {
-        "gas": -revolution["piston_force"].values,
-        "inertia": -mass * revolution["acceleration"].values,
-        "rod": revolution["contact_force"].sel(joint="small_end", axis="x").values,
-    }
 
 
 def sort_by_angle(degrees: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

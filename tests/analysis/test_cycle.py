@@ -9,12 +9,12 @@ from conftest import listed
 
 from compressor.analysis.cam import Cam
 from compressor.analysis.contacts import impacts
-from compressor.analysis.cycle import find_reversals, read_cycle, read_loads
+from compressor.analysis.cycle import find_reversals, read_cycle
 from compressor.analysis.runs import record_of
 from compressor.analysis.shaking import NoSeriesError, frame_forces, healthy_twin
 from compressor.cases.case import Case
 from compressor.report.figures.drawing import as_csv, panels_of
-from compressor.report.figures.job import draw_analyst, split_events
+from compressor.report.figures.job import draw_analyst, read_signals, split_events
 from compressor.report.figures.rows import SweptRow, draw_segments, number_segments
 from compressor.report.figures.table import spell
 from compressor.solve.simulate import simulate
@@ -234,7 +234,9 @@ def test_gas_and_inertia_make_the_rod_load():
     """Of a machine without clearance, and with it: Newton's law of the crosshead."""
     for worn in ({}, {"joint": "both", "clearance_mm": 0.1}):
         run = simulate(Case.from_values({"load": "gas"} | worn))
-        degrees, loads = read_loads(run)
+        degrees, found = read_signals(run)
         assert degrees[-1] - degrees[0] == pytest.approx(360.0)
-        assert np.abs(loads["rod"]).max() > 3e3
-        assert np.allclose(loads["rod"], loads["gas"] + loads["inertia"], atol=1e-6, rtol=1e-6)
+        assert np.abs(found["rod_load"]).max() > 3e3
+        assert np.allclose(
+            found["rod_load"], found["load"] + found["inertia"], atol=1e-6, rtol=1e-6
+        )

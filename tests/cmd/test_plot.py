@@ -95,8 +95,8 @@ def test_a_job_is_drawn_with_its_numbers(plot, folder, unpainted):
     names = [f"plots/{mine[:10]}-{name}.png" for name in drawn]
     assert [*found] == names
     run = job(folder, "worn", 3)
-    analyst, loads, signals, spectra, orbits, impacts = found.values()
-    assert "both combined, without clearance: " in loads
+    analyst, signals, spectra, orbits, impacts = found.values()
+    assert "both combined, without clearance: " in signals
     force = frame_forces(run)
     last = slice(2 * 720, None)
     x = force["shaking_force"][last, 0] / 1e3
@@ -172,7 +172,7 @@ def test_ideal_joints_have_no_contacts_to_draw(plot, folder, unpainted):
     code, found, _ = plot(mine)
     assert code == 0
     drawn = [name.rpartition("-")[2] for name in found]
-    assert drawn == ["analyst.png", "loads.png", "signals.png", "cards.png", "spectra.png"]
+    assert drawn == ["analyst.png", "signals.png", "cards.png", "spectra.png"]
     code, found, _ = plot("ideal")
     assert (code, len(found)) == (0, 2)
 

@@ -1,6 +1,6 @@
 """Figures of one job: signals, cards, spectra, orbits, impacts."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -17,7 +17,6 @@ from compressor.analysis import (
     joints_with_clearance,
     last_revolution,
     read_cycle,
-    read_loads,
     settled_revolutions,
     shaking,
 )
@@ -166,39 +165,34 @@ SIGNALS = (
     Signal("force on the frame across the cylinder", "Y", "kN", "across"),
     Signal("force of the crosshead on its guide, upwards", "F<sub>g</sub>", "kN", "guide_force"),
     Signal("torque that drives the crank", "T", "N m", "crank_torque"),
-    Signal("rod load at the crosshead pin, tension positive", "F<sub>r</sub>", "kN", "rod_load"),
-)
-LOADS = (
-    Signal("load of gas or spring on the piston, tension positive", "F<sub>g</sub>", "kN", "gas"),
+    Signal("load of gas or spring on the piston, tension positive", "F<sub>p</sub>", "kN", "load"),
     Signal("inertia of what reciprocates", "F<sub>i</sub>", "kN", "inertia"),
-    Signal("rod load at the crosshead pin: both combined", "F<sub>r</sub>", "kN", "rod"),
+    Signal("rod load at the crosshead pin: both combined", "F<sub>r</sub>", "kN", "rod_load"),
 )
 
 
 def read_signals(run: xr.Dataset) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return crank angles (degrees) of the last revolution, its acceleration and its forces, SI."""
+    """Return crank angles (degrees) of the last revolution, and its signals by name, SI.
+
+    Of a rigid crosshead in a guide without friction the rod load is that of gas or spring and of
+    inertia together.
+    """
     degrees, revolution = last_revolution(run)
     forces = frame_forces(revolution)
     along, across = forces["shaking_force"].T
-    own = {"acceleration": revolution["acceleration"].values, "along": along, "across": across}
-    return degrees, forces | own
+    acceleration = revolution["acceleration"].values
+    return degrees, forces | {
+        "acceleration": acceleration, "along": along, "across": across,
+        "load": -revolution["piston_force"].values,
+        "inertia": -case_of(run).machine.reciprocating_mass_kg * acceleration,
+    }  # fmt: skip
 
 
-@figure("job", "signals", "acceleration, forces and torque over crank angle",
-        signals=SIGNALS, read=read_signals, height=8.6)  # fmt: skip
-@figure("job", "loads", "gas load, inertia and rod load over crank angle",
-        signals=LOADS, read=read_loads, height=7.2)  # fmt: skip
-def draw_signals(
-    run: xr.Dataset, twin: Twin, signals: Sequence[Signal],
-    read: Callable[[xr.Dataset], tuple[np.ndarray, Mapping[str, np.ndarray]]], height: float,
-    units: Units = "usual",
-) -> DrawnFigure:  # fmt: skip
-    """Return panels of a run's last settled revolution, with the ideal machine's.
-
-    read: returns the crank angles (degrees) of a run, and its series in SI by the signals' names.
-    """
-    drawing, panels = make_grid(3, len(signals) // 3, height, units=units, share_x="all")
-    for panel, signal in zip(panels.flat, signals, strict=True):
+@figure("job", "signals", "acceleration, loads, forces and torque over crank angle")
+def draw_signals(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
+    """Return panels of a run's last settled revolution, with the ideal machine's."""
+    drawing, panels = make_grid(4, 2, 10.4, units=units, share_x="all")
+    for panel, signal in zip(panels.flat, SIGNALS, strict=True):
         panel.title = signal.title
         panel.label("x", ANGLE_AXIS, "°")
         panel.label("y", f"{signal.axis} ({{}})", signal.unit)
@@ -208,8 +202,8 @@ def draw_signals(
     for one, line, name, where in both:
         if one is None:
             continue
-        degrees, series = read(one)
-        for panel, signal in zip(panels.flat, signals, strict=True):
+        degrees, series = read_signals(one)
+        for panel, signal in zip(panels.flat, SIGNALS, strict=True):
             values = series[signal.name] * (KILONEWTON if signal.unit == "kN" else 1.0)
             panel.plot(degrees, values, line, NAMES[name])
             numbers.append((f"{signal.title}{where}", spell_span(values, signal.unit)))
