@@ -1,4 +1,4 @@
-"""`compsim export`: results as netCDF or CSV, for other programs."""
+"""`compsim export`: results as CSV, for other programs."""
 
 import os
 
@@ -11,10 +11,10 @@ from compsim import options, screen
 @click.command()
 @click.argument("names", nargs=-1, metavar="[STUDY]...|JOB")
 @options.results
-@options.output("Write this file: .nc or .csv.", required=True, metavar="FILE", type=options.FILE)
+@options.output("Write this file, a .csv.", required=True, metavar="FILE", type=options.FILE)
 @click.option("--force", is_flag=True, help="Replace a file that exists.")
 def export(names, folder, output, force) -> int:
-    """Write results as a file that other programs read.
+    """Write results as a CSV file, which other programs read.
 
     \b
     compsim export wear -o wear.csv
@@ -22,7 +22,7 @@ def export(names, folder, output, force) -> int:
 
     A STUDY becomes a table of its jobs, failed and missing ones included; several, and all
     without a name, become one table. A JOB, named by the beginning of its key, becomes a table of
-    samples, in CSV with its sensor's record. Numbers are in SI.
+    samples, with its sensor's record beside. Numbers are in SI.
     """
     from compressor.store import export as write
     from compressor.store import writable_folder

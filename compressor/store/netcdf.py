@@ -165,14 +165,10 @@ def write_dataset(path: Path, dataset: "xr.Dataset") -> Path:
 
     Its attribute `program` says what wrote it. Raises StoreError where the disk refuses.
     """
-    publish(path, encode_dataset(dataset.assign_attrs(program=PROGRAM)))
-    return path
-
-
-def encode_dataset(dataset: "xr.Dataset") -> bytes:
-    """Return a Dataset as the bytes of a netCDF-4 file."""
     variables = {str(n): (one.dims, one.values, one.attrs) for n, one in dataset.variables.items()}
-    return encode_netcdf(variables, {str(name): value for name, value in dataset.attrs.items()})
+    attributes = {str(name): value for name, value in dataset.attrs.items()}
+    publish(path, encode_netcdf(variables, attributes | {"program": PROGRAM}))
+    return path
 
 
 def read_dataset(path: Path, remedy: str = REMEDY) -> "xr.Dataset":

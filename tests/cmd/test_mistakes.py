@@ -82,7 +82,7 @@ MISTAKES = [
       for text in ("15", "a,b", "200,3", "15,-1")),
     ("show", "Missing argument 'JOB | STUDY [AXIS=VALUE]...'"),
     ("export gird -o x.csv", "holds no study 'gird'; it holds big-end, wear"),
-    ("export wear -o k.xlsx", "k.xlsx: no files of the type .xlsx are written; end the"),
+    ("export wear -o k.xlsx", "k.xlsx: is no name of a CSV file; end it in .csv"),
     ("plot waer", "and no study is called so", "did you mean wear?"),
     ("plot wear --what orbit", "there is no figure 'orbit'; did you mean orbits?"),
     ("plot wear --over sped_rpm", "wear has no axis 'sped_rpm'; its axes are clearance_mm, "),

@@ -1,13 +1,10 @@
 """Results for other programs: what `compsim export` writes reads back as what is stored."""
 
 import csv
-import json
 import shutil
 
-import h5py
 import numpy as np
 import pytest
-import xarray as xr
 from conftest import flip, keep, write_cases
 
 from compressor.cases.load import load_studies
@@ -70,35 +67,18 @@ def test_metrics_in_csv_are_the_stored_ones_to_the_bit(results, tmp_path):
     assert sorted(row["status"] for row in rows) == ["failed", "failed", "missing", "ok"]
 
 
-def test_metrics_in_netcdf_open_as_the_study(results, tmp_path):
-    export(results, ["grid"], tmp_path / "grid.nc")
-    study = open_study(results, "grid")
-    with xr.open_dataset(tmp_path / "grid.nc", engine="h5netcdf") as kept:
-        assert dict(kept.sizes) == {n: s for n, s in study.sizes.items() if n != "time"}
-        assert {*kept.coords} == {*study.coords} - {"time"}
-        for name in kept.variables:
-            xr.testing.assert_equal(kept[name].variable, study[name].variable)
-            assert kept[name].attrs == study[name].attrs
-        (origin,) = json.loads(kept.attrs["studies"])
-        assert origin["fixed"]["joint"] == "both"
-
-
 def test_studies_together_have_a_dimension_of_jobs(results, tmp_path):
-    export(results, [], tmp_path / "all.nc")
     export(results, [], tmp_path / "all.csv")
-    study = open_study(results)
-    with xr.open_dataset(tmp_path / "all.nc", engine="h5netcdf") as kept:
-        assert kept.sizes["job"] == 6
-        assert kept.study.values.tolist() == ["grid"] * 4 + ["list"] * 2
-        xr.testing.assert_equal(kept.speed_rpm, study.speed_rpm)
-    assert [row["key"] for row in table(tmp_path / "all.csv")] == study.key.values.tolist()
+    rows, study = table(tmp_path / "all.csv"), open_study(results)
+    assert [row["key"] for row in rows] == study.key.values.tolist()
+    assert [row["study"] for row in rows] == ["grid"] * 4 + ["list"] * 2
+    assert [number(row["speed_rpm"]) for row in rows] == study.speed_rpm.values.tolist()
 
 
 @pytest.mark.parametrize("name", ["grid", "list"])
 def test_series_read_back_to_the_bit(results, name, tmp_path):
     (key, *_) = (k for k in open_study(results, name).key.values.flat if stored(results, k))
-    for suffix in ("csv", "nc"):
-        export(results, [key[:12]], tmp_path / f"job.{suffix}")
+    export(results, [key[:12]], tmp_path / "job.csv")
     job = read_job(results, key)
     rows = table(tmp_path / "job.csv")
     expected = {
@@ -110,11 +90,6 @@ def test_series_read_back_to_the_bit(results, name, tmp_path):
     assert next(iter(rows[0])) == "time [s]"
     for header, values in expected.items():
         np.testing.assert_array_equal([number(row[header]) for row in rows], values.values)
-    with xr.open_dataset(tmp_path / "job.nc", engine="h5netcdf") as kept:
-        xr.testing.assert_equal(kept.acceleration, job.acceleration)
-        assert kept.acceleration.attrs == job.acceleration.attrs
-    with h5py.File(tmp_path / "job.nc") as file:
-        assert file["acceleration"].dtype == ("f4" if name == "list" else "f8")
 
 
 def stored(results, key):
@@ -127,9 +102,8 @@ def stored(results, key):
 @pytest.mark.parametrize(
     ("names", "file", "message"),
     [
-        (["grid", "KEY"], "x.nc", "x.nc: has studies, or one job; export each job to a file"),
-        (["grid"], "x.xls", r"no files of the type .xls are written; end the name in .nc or"),
-        (["grid"], "x", "no folders are written; end the name in .nc or .csv"),
+        (["grid", "KEY"], "x.csv", "x.csv: has studies, or one job; export each job to a file"),
+        (["grid"], "x.xls", "x.xls: is no name of a CSV file; end it in .csv"),
         (["grid"], "grid.csv", "grid.csv: exists; --force replaces it"),
     ],
 )

@@ -101,7 +101,7 @@ def complete_store(folder):
         SWEEP.sweep(load_studies(*cases), folder / "complete", 1)
 
     assert not (ended := forked(fill, 600)).death, ended
-    for words in (["plan", *cases], ["status"], ["export", "--force", "-o", folder / "out.nc"]):
+    for words in (["plan", *cases], ["status"], ["export", "--force", "-o", folder / "out.csv"]):
         assert command(*words, "-r", folder / "complete").code == 0  # what forks need is imported
     return folder / "complete", cases
 

@@ -36,7 +36,7 @@ SCENES = {
     "a new store": ("nothing", RUN),
     "a store with leftovers": ("grown", RUN),
     "a damaged store": ("damaged", RUN),
-    "export": ("complete", "export -r FOLDER -o FOLDER/out.nc --force"),
+    "export": ("complete", "export -r FOLDER -o FOLDER/out.csv --force"),
     "status": ("complete", "status -r FOLDER"),
     "verify": ("complete", "verify -r FOLDER"),
     "show": ("complete", "show KEY -r FOLDER"),
