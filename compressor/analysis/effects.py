@@ -14,6 +14,8 @@ LEVEL = 0.95
 SEED = 1  # of the resampling
 ORDERS = ("first_order", "total_order")
 MAX_GAPS = 0.2  # of a grid's points
+FILLS = 500  # rounds of filling
+FILLED = 1e-9  # of the values' span: no round changes more
 MIN_POINTS = 8  # points of a ranking
 MAX_BASE = 1024  # points of the parts of a `saltelli` design, beyond which its bootstrap is slow
 RANKING_RESAMPLES = 400
@@ -155,14 +157,26 @@ def grid_effects(values: np.ndarray) -> Effects | None:
 
 
 def fill_unknown(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
-    """Return the values with unknown points filled by the sum of their axes' main effects."""
+    """Return the values with unknown points filled by the sum of their axes' main effects.
+
+    The main effects are found by iteration, since unknown points are part of the means: a design
+    of all points would be too large for an axis of thousands.
+    """
     if not unknown.any():
         return values
-    places = zip(values.shape, np.indices(values.shape), strict=True)
-    design = np.concatenate([np.eye(size)[place.ravel()] for size, place in places], axis=1)
-    known = design[~unknown.ravel()]
-    found, *_ = np.linalg.lstsq(known.T @ known, known.T @ values[~unknown])
-    return np.where(unknown, (design @ found).reshape(values.shape), values)
+    found = np.where(unknown, values[~unknown].mean(), values)
+    span = np.ptp(values[~unknown])
+    for _ in range(FILLS):
+        mean = found.mean()
+        expected = np.full_like(found, mean)
+        for axis in range(found.ndim):
+            rest = tuple(n for n in range(found.ndim) if n != axis)
+            expected += found.mean(axis=rest, keepdims=True) - mean
+        change = abs(np.where(unknown, expected - found, 0.0)).max()
+        found = np.where(unknown, expected, found)
+        if change <= FILLED * span:
+            break
+    return found
 
 
 def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effects | None:

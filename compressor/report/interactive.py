@@ -112,8 +112,8 @@ def job_scripts(
             continue
         try:
             figure = draw_job(read_shown(stored, key), units)
-        except (NoSeriesError, DamagedFile):
-            continue  # shorter than a revolution, or its file is damaged: others report it
+        except (NoSeriesError, DamagedFile, KeyError, ValueError):
+            continue  # shorter than a revolution, damaged, or of another version: others report it
         found += 1
         yield key, script(series_name(key), figure)
 

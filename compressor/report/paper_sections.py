@@ -1,6 +1,7 @@
 """The sections of a report about the paper: figures, cases, claims, own machines."""
 
 import math
+import shlex
 import warnings
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,7 +30,7 @@ from compressor.report.figures.sweep_data import measures
 from compressor.report.limits import NO_LIMITS, Limits
 from compressor.report.page import Section, SectionContent, ShownFigure, StudyNote, show_figure
 from compressor.report.study_section import file_name, jobs_table
-from compressor.store import DamagedFile, Stored, StoredStudy, StoreWarning, label_studies
+from compressor.store import DamagedFile, Folder, Stored, StoredStudy, StoreWarning, label_studies
 from compressor.units import Units
 
 
@@ -164,9 +165,9 @@ CASES = (
     "as contact in an ideal joint."
 )
 TO_GET = (
-    "compsim init paper writes a file that has all cases of the paper, and compsim run paper.yaml "
-    "runs those that are not stored. A case that failed is run again with --rerun failed, or as a "
-    "new job once its settings change."
+    "compsim init paper writes a file that has all cases of the paper, and {command} runs those "
+    "that are not stored. A case that failed is run again with --rerun failed, or as a new job "
+    "once its settings change."
 )
 
 
@@ -205,7 +206,7 @@ def label_in_words(name: str) -> str:
     return f"{SPOKEN[fault]}, {clearance} mm" if clearance else f"{fault} model, no clearance"
 
 
-def missing_sections(paper: PaperRuns) -> Iterator[Section]:
+def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
     """Yield the figures that could not be drawn, what they lack, and how to get it."""
     lacking = {
         item.title: [name for name in item.needs if name in paper.absent] for item in PAPER.values()
@@ -217,7 +218,8 @@ def missing_sections(paper: PaperRuns) -> Iterator[Section]:
         if names
     ]
     if figures:
-        content = SectionContent(None, [TO_GET], figures)
+        command = f"compsim run paper.yaml -r {shlex.quote(str(results))}"
+        content = SectionContent(None, [TO_GET.format(command=command)], figures)
         yield Section("missing", "Figures that could not be drawn", content)
 
 

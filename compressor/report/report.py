@@ -177,7 +177,7 @@ def build_report(
         *(one.table for one in drawn),
         *tables,
         assumptions_section(bool(paper.stored)),
-        *(missing_sections(paper) if papers else ()),
+        *(missing_sections(paper, results) if papers else ()),
         provenance_section(studies, results, command),
     ]
     series = {key: text for one in drawn for key, text in job_scripts(stored, one.jobs.jobs, units)}

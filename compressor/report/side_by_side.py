@@ -24,7 +24,7 @@ from compressor.report.page import (
 from compressor.store import Stored
 from compressor.units import Units
 
-MAX_WORN = 10  # jobs that stand beside the machine without clearance
+MAX_WORN = 10  # jobs, and the worst, that stand beside the machine without clearance
 CLEARANCES = {"clearance_mm", *stands_for("clearance_mm")}
 MAX_TRIED = 50  # jobs among which the worst with clearance is looked for
 FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its meaning

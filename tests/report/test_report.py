@@ -272,6 +272,7 @@ def test_missing_cases_are_named_with_what_gives_them(paper_store, tmp_path):
     assert "Figure 9: Contact force at the big end needs big end, 0.2 mm (not stored)" in found.text
     assert "typical model needs" not in found.text
     assert "compsim init paper writes a file that has all cases of the paper" in found.text
+    assert f"compsim run paper.yaml -r {part} runs those that are not stored" in found.text
     assert cli.main(["init", "paper", "-o", str(tmp_path / "paper.yaml")]) == 0
     given = {case.physics_key for case in load_cases(tmp_path / "paper.yaml")}
     assert given == {case.physics_key for case in paper_cases().values()}

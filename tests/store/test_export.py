@@ -5,6 +5,7 @@ import shutil
 
 import numpy as np
 import pytest
+import xarray as xr
 from conftest import flip, keep, write_cases
 
 from compressor.cases.load import load_studies
@@ -65,6 +66,16 @@ def test_metrics_in_csv_are_the_stored_ones_to_the_bit(results, tmp_path):
                 cell = row["_".join([name, *labels]) + ending]
                 np.testing.assert_array_equal(number(cell), job[name].values[index])
     assert sorted(row["status"] for row in rows) == ["failed", "failed", "missing", "ok"]
+
+
+def test_a_study_and_a_job_are_written_by_xarray(results, tmp_path):
+    """What the CHANGELOG names in place of an export in netCDF."""
+    study = open_study(results, "grid")
+    key = str(study["key"].values[(study.status == "ok").values][0])
+    for name, made in (("study", study), ("job", read_job(results, key))):
+        made.to_netcdf(tmp_path / f"{name}.nc")
+        with xr.open_dataset(tmp_path / f"{name}.nc") as found:
+            xr.testing.assert_equal(found, made)
 
 
 def test_studies_together_have_a_dimension_of_jobs(results, tmp_path):

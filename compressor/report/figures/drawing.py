@@ -123,9 +123,7 @@ class Panel:
             made.error_y = error_bars(self.factors["y"] * errors)
         self.add(made, style.zorder, jobs, name * listed)
 
-    def fill(
-        self, x: ArrayLike, y: ArrayLike, style: LineStyle, name: str = "", listed: bool = True
-    ) -> None:
+    def fill(self, x: ArrayLike, y: ArrayLike, style: LineStyle, name: str = "") -> None:
         """Draw an area by its outlines, with nan between two of them."""
         made = go.Scatter(
             x=self.at("x", x), y=self.at("y", y), name=name, opacity=style.alpha, mode="none",
@@ -133,7 +131,7 @@ class Panel:
         )  # fmt: skip
         if style.is_hatched:
             made.fillpattern = {"shape": "/", "fgcolor": style.edge, "bgcolor": style.color}
-        self.add(made, style.zorder, (), name * listed)
+        self.add(made, style.zorder, (), name)
 
     def strokes(self, x: np.ndarray, low: float, high: np.ndarray, style: LineStyle) -> None:
         """Draw a vertical line from `low` to `high` at each x."""

@@ -162,7 +162,8 @@ class Feature(NamedTuple):
     """A feature of the model: what a case file gives with it, and without it.
 
     key: which a case sets that has the feature, to `word` where that is given; off: name of a case
-    that is changed so. is_choice: another model of the same machine, no other machine.
+    that is changed so. is_choice: another model of the same machine, no other machine;
+    others are what `make tradeoff` tries.
     """
 
     name: str
