@@ -12,7 +12,7 @@ from compressor.physics.loads import (
     segments,
     static_load,
 )
-from compressor.physics.march import Status, WorkArrays, march, new_stepper, new_work, rehearse
+from compressor.physics.march import Status, march, new_stepper, new_work, rehearse
 from compressor.physics.mechanism_rows import STALLED
 from compressor.physics.observe import COLUMNS, WIDE, Column, frame_of_series
 from compressor.physics.onset import approach_at

@@ -16,5 +16,5 @@ from compressor.solve.run_metrics import (
 )
 from compressor.solve.search import find_repetition, least_promise, steady, with_settle_rev
 from compressor.solve.series import SIGNALS, signals_of_scene
-from compressor.solve.si_record import gas_nodes, is_ideal, natural_sizes, record, stiffness_of
+from compressor.solve.si_record import gas_nodes, natural_sizes, record, stiffness_of
 from compressor.solve.simulate import measure, observe, simulate

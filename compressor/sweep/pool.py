@@ -2,7 +2,8 @@
 
 joblib gives threads, their queue and their results. Each thread has a process of its own, with a
 pipe that breaks if that dies: so a death names its own job, and costs no other process. All are
-copies of one process that has loaded the equations, which takes two seconds, and runs no job.
+copies of one process, the loader, that has loaded the equations, which takes two seconds, and runs
+no job; should that die, all are made anew.
 """
 
 import contextlib
@@ -180,19 +181,20 @@ class Pool:
         Raises WorkersFailed.
         """
         with self.lock:
-            if self.stopped:
-                raise Death("the pool's end")
             spare = self.idle.pop() if self.idle else None
-            if spare and not anew:
-                return spare
-            if not self.loader or self.loader.process.poll() is not None:
-                try:
-                    self.loader = Loader(self.setup)
-                except OSError as error:
-                    raise WorkersFailed(f"no worker process can be started: {error}") from error
+        if spare and not anew:
+            return spare
         if spare:
             spare.end()
-        return self.loader.start_worker()
+        try:
+            with self.lock:
+                if self.stopped:
+                    raise Death("the pool's end")
+                if not self.loader or self.loader.process.poll() is not None:
+                    self.loader = Loader(self.setup)
+            return self.loader.start_worker()
+        except OSError as error:
+            raise WorkersFailed(f"no worker process can be started: {error}") from error
 
     def settle(self, job: Job, end: End) -> End:
         """Return the end of a job with its id."""
@@ -212,7 +214,7 @@ class Pool:
         waiting, half = self.batches.waiting, len(batch) // 2
         if died.place is None:
             self.fruitless += 1
-            if self.fruitless > MAX_FRUITLESS:
+            if self.fruitless > MAX_FRUITLESS + self.batches.width:  # all wait for one loader
                 raise WorkersFailed(f"jobs could not even begin: {died.how}")
             waiting.append(batch)
             return []
@@ -295,7 +297,7 @@ class Loader:
         with contextlib.suppress(OSError), open_socket(self.calls) as carrier:
             carrier.shutdown(socket.SHUT_RDWR)  # other threads may wait for an answer
         try:
-            self.process.wait(END_SECONDS)
+            self.process.wait(0 if self.lock.locked() else END_SECONDS)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
@@ -326,7 +328,9 @@ class Worker:
         """Kill the process; return its exit code."""
         try:
             return int(self.loader.call(self.pid))
-        except Death:  # which took its copies along
+        except Death:  # which takes its copies along on Linux alone
+            with contextlib.suppress(OSError):
+                os.kill(self.pid, signal.SIGKILL)
             return -signal.SIGKILL
 
 

@@ -51,7 +51,7 @@ class End(NamedTuple):
 class Workers:
     """Worker processes: how many, and the rules for them.
 
-    `prepare` is called once in each, before its clocks and limits are set. `memory`: bytes that a
+    `prepare` is called once in the loader, of which all are copies. `memory`: bytes that a
     job may add (by default `memory_share`). `grace`: s beyond its time in which a job may end by
     itself. `target_seconds`: of a batch.
     """
@@ -80,14 +80,26 @@ def serve(calls: Connection) -> None:
         gc.freeze()  # what is there stays: looking at it took a thirtieth of short jobs' time
         gc.enable()
     except BaseException as error:
-        calls.send(WorkersFailed(f"jobs could not even begin: {describe_error(error)[0]}"))
+        with contextlib.suppress(OSError):  # nobody may listen
+            calls.send(WorkersFailed(f"jobs could not even begin: {describe_error(error)[0]}"))
         return
-    loader, workers = os.getpid(), set[int]()
-    with contextlib.suppress(EOFError):
+    loader, pipe = os.getpid(), answer_calls(calls)
+    if pipe:
+        settle()
+        if os.getppid() == loader:  # it is there still
+            limit(rules.memory)
+            serve_batches(pipe, work, store, rules.target_seconds)
+
+
+def answer_calls(calls: Connection) -> Connection | None:
+    """Make and end workers; return the pipe of one in its process, None at the end of `calls`."""
+    workers: set[int] = set()
+    with contextlib.suppress(EOFError, OSError, ValueError):  # of what was cut short, too
         while True:
             if pid := calls.recv():
                 workers.discard(pid)
-                calls.send(end_process(pid))
+                os.kill(pid, signal.SIGKILL)
+                calls.send(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
                 continue
             with open_socket(calls) as carrier:
                 _, (file,), _, _ = socket.recv_fds(carrier, 1, 1)
@@ -95,30 +107,23 @@ def serve(calls: Connection) -> None:
                 pid = os.fork()
             except OSError as error:
                 calls.send(WorkersFailed(f"no worker process can be started: {error}"))
-                break
+                continue
             if not pid:
                 calls.close()
-                settle()
-                if os.getppid() == loader:  # it is there still
-                    limit(rules.memory)
-                    serve_batches(Connection(file), work, store, rules.target_seconds)
-                return
+                return Connection(file)
             os.close(file)
             workers.add(pid)
             calls.send(pid)
     for pid in workers:
-        end_process(pid)
+        os.kill(pid, signal.SIGKILL)
+    for pid in workers:
+        os.waitpid(pid, 0)
+    return None
 
 
 def open_socket(pipe: Connection) -> socket.socket:
     """Return the socket that a pipe is made of, to be closed."""
     return socket.socket(fileno=os.dup(pipe.fileno()))
-
-
-def end_process(pid: int) -> int:
-    """Kill a child process; return its exit code, -N by signal N."""
-    os.kill(pid, signal.SIGKILL)
-    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
 
 def serve_batches(
@@ -150,6 +155,7 @@ def settle() -> None:
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     for number in (signal.SIGINT, signal.SIGHUP):  # Ctrl-C reaches all: the parent ends us
         signal.signal(number, signal.SIG_IGN)
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # ignored, exit codes would be lost
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
     with contextlib.suppress(OSError):  # there may be no stderr
         os.dup2(2, 1)  # stdout is for data

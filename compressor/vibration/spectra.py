@@ -101,15 +101,14 @@ def band_signal(values: np.ndarray, rate: float, low: float, high: float) -> np.
 
 
 def envelope_spectrum(
-    values: np.ndarray, rate: float, band: tuple[float, float], speed: float = 1.0
+    values: np.ndarray, rate: float, band: tuple[float, float]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the amplitude spectrum of the envelope in a band: (frequencies, amplitudes).
 
-    values: (m,) at a rate of samples a second, band in Hz, both edges included. Frequencies are in
-    Hz, or orders if a speed in revolutions a second is given; with a rate of samples a revolution,
-    band and frequencies are in orders anyway. Amplitudes are peak values; the line at zero is the
-    mean envelope. A carrier A (1 + d cos(2 pi f t)) has lines A at 0 and A d at f. Raises
-    RecordError where no line of the signal lies in the band.
+    values: (m,) at a rate of samples a second, band and frequencies in Hz, with both edges; with
+    a rate of samples a revolution, band and frequencies are in orders. Amplitudes are peak values;
+    the line at zero is the mean envelope. A carrier A (1 + d cos(2 pi f t)) has lines A at 0 and
+    A d at f. Raises RecordError where no line of the signal lies in the band.
     """
     (low, high), apart = band, rate / len(values)
     if math.floor(min(high, rate / 2) / apart) < math.ceil(low / apart):
@@ -120,7 +119,7 @@ def envelope_spectrum(
 
     envelope = np.abs(hilbert(band_signal(values, rate, low, high)))
     amplitudes = line_amplitudes(envelope, envelope.size, rms=False)
-    return np.arange(amplitudes.size) * (rate / envelope.size / speed), amplitudes
+    return np.arange(amplitudes.size) * (rate / envelope.size), amplitudes
 
 
 def shape(values: np.ndarray) -> tuple[float, float, float, float]:

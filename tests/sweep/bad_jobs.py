@@ -96,6 +96,14 @@ def prepare(folder, seconds):
     note(folder, os.getpid())
 
 
+def die_first(folder):
+    """Be killed, but for the second time."""
+    if not (mark := Path(folder, "died")).exists():
+        mark.touch()
+        time.sleep(0.5)  # in which all wait
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
 def is_prepared(folder, _):
     """Whether the process of which this is a copy has taken its while."""
     return Path(folder, str(os.getppid())).exists()

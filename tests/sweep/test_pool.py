@@ -181,11 +181,12 @@ def test_workers_that_cannot_begin_end_the_call_and_say_why(prepare, why, monkey
         list(run_batches(work, named(range(100)), Workers(2, prepare)))
 
 
-def test_no_room_for_workers_ends_the_call(monkeypatch):
+@pytest.mark.parametrize("what", [(subprocess, "Popen"), (pool, "Pipe")])
+def test_no_room_for_workers_ends_the_call(what, monkeypatch):
     def refuse(*arguments, **options):
         raise BlockingIOError("no more processes")
 
-    monkeypatch.setattr(subprocess, "Popen", refuse)
+    monkeypatch.setattr(*what, refuse)
     with pytest.raises(WorkersFailed, match="no worker process can be started: no more processes"):
         list(run_batches(work, named(range(100)), Workers()))
 
@@ -246,6 +247,22 @@ def test_workers_are_made_anew_where_their_loader_has_died():
     (loader,) = children() - before
     os.kill(loader, signal.SIGKILL)
     assert results([*found, *ends]) == {n: n for n in range(300)}
+
+
+def test_a_loader_that_dies_while_all_wait_for_it_is_made_anew(tmp_path):
+    rules = Workers(12, partial(bad_jobs.die_first, tmp_path))
+    assert results(run_batches(work, named(range(60)), rules)) == {n: n for n in range(60)}
+
+
+def test_a_worker_s_end_is_known_where_our_starter_ignores_it():
+    """SIGCHLD that is ignored is inherited, and would keep exit codes from us."""
+    former = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    try:
+        ends = list(run_batches(work, named([1, "crash", 2]), Workers(1, **RULES)))
+    finally:
+        signal.signal(signal.SIGCHLD, former)
+    assert results(ends) == {1: 1, 2: 2}
+    assert [end.reason for end in lost(ends).values()] == ["worker_died"]
 
 
 @pytest.mark.parametrize("workers", [1, 2])
