@@ -44,7 +44,7 @@ END_SECONDS = 1.0  # s in which processes that are not at work end
 MEMORY_SHARE = 0.75  # of the machine's memory, for all workers together
 MEMORY_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 START = (  # the loader's program, which has our path and not our main module
-    "import sys; from multiprocessing.connection import Connection; "
+    "import gc, sys; gc.disable(); from multiprocessing.connection import Connection; "
     "pipe = Connection(int(sys.argv[1])); sys.path[:] = pipe.recv(); "
     "from compressor.sweep.worker import serve; serve(pipe)"
 )

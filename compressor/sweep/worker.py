@@ -75,8 +75,7 @@ def serve(calls: Connection) -> None:
         parent, work, store, rules = calls.recv()
         if os.getppid() != parent:  # it died before `settle`
             return
-        gc.disable()  # until all is loaded: that is no garbage, and much to look at
-        rules.prepare()
+        rules.prepare()  # without the collector, as from the start: none of that is garbage
         gc.freeze()  # what is there stays: looking at it took a thirtieth of short jobs' time
         gc.enable()
     except BaseException as error:
