@@ -80,7 +80,7 @@ def torque_and_moment(crank, x, forces, friction, penetration, film, p):
 
 @inner
 def write_frame_forces(guide, turning, row):
-    """Write the forces (N) on the frame, by those on its guide and on the crank's unbalance."""
+    """Write the machine's forces (N) on its frame, by those on the guide and of the unbalance."""
     row[BEARING_FORCE] = -row[FORCE] - turning[0]
     row[BEARING_FORCE + 1] = -row[FORCE + 1] - turning[1]
     row[GUIDE_FORCE] = guide[1]

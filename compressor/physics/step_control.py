@@ -1,4 +1,4 @@
-"""Whether a step is taken, how long the next one is, and which method takes it.
+"""How long the next step is, and which method takes it; `march` decides whether one is taken.
 
 PI control of the error, a first step from the rates, and the measured test for stiffness by which
 a stepper turns to the stiff partner and back.
