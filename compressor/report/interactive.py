@@ -112,8 +112,8 @@ def job_scripts(
             continue
         try:
             figure = draw_job(read_shown(stored, key), units)
-        except (NoSeriesError, DamagedFile, KeyError, ValueError):
-            continue  # shorter than a revolution, damaged, or of another version: others report it
+        except (NoSeriesError, DamagedFile):
+            continue  # shorter than a revolution, or its file is damaged: others report it
         found += 1
         yield key, script(series_name(key), figure)
 
@@ -128,7 +128,13 @@ def read_shown(stored: Stored, key: str) -> xr.Dataset:
         name: (("time", *SERIES.get(name, ((),))[0]), values)
         for name, values in stored.values(key, SHOWN).items()
     }
-    return xr.Dataset(variables, attrs={"settle": stored.attributes(position)["settle"]})
+    try:
+        settle = stored.attributes(position)["settle"]
+        return xr.Dataset(variables, attrs={"settle": settle})
+    except (KeyError, ValueError) as error:
+        path = stored.batch_of(position)[0]
+        problem = "holds time series of different lengths, or no end of settling"
+        raise DamagedFile(path, problem, "run its study again") from error
 
 
 def series_name(key: str) -> str:

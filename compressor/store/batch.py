@@ -278,7 +278,7 @@ def read_outcomes(path: Path) -> list[Outcome]:
 
     Raises DamagedFile also for numbers of another version, which only that one can read.
     """
-    with open_netcdf(path):  # so that it is opened in a moment below
+    with open_netcdf(path):  # HDF5 shares a file that is open: what is read below opens it at once
         columns, labels = read_batch(path)
         if not {*labels} <= VALUES.keys():
             raise ValueError

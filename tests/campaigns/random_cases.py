@@ -1,17 +1,19 @@
 """Cases drawn at random: the ground on which promises and error bars are judged.
 
 Clearance 0.01-1 mm, rod 2-8 kg, reciprocating mass 4-25 kg, 100-1500 rpm, all loads and all scenes
-with clearance; friction is on, all else as by default. Clearance and speed are drawn evenly in
-their logarithms.
+with clearance; friction is on, all else as by default. `random_cases` is a Sobol sequence, with
+speeds drawn evenly; `strangers` draws clearance and speed evenly in their logarithms.
 """
 
 from functools import cache
 
 import numpy as np
+from scipy.stats import qmc
 
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 
+SEED = 2021
 LOADS = ("spring", "gas", "none")
 JOINTS = ("big_end", "small_end", "both")
 
@@ -21,22 +23,34 @@ def rounded(value):
     return float(f"{value:.4g}")
 
 
-def strangers(seed, count):
-    """Cases as a stranger would draw them: values of case files without `solve`."""
+def drawn(load, joint, clearance, rod, mass, rpm):
+    """A case, as values of a case file without `solve`, from numbers in [0, 1) and a speed."""
+    return {
+        "load": LOADS[int(3 * load)],
+        "joint": JOINTS[int(3 * joint)],
+        "clearance_mm": rounded(10 ** (2 * clearance - 2)),
+        "machine": {
+            "rod_mass_kg": rounded(2 + 6 * rod),
+            "reciprocating_mass_kg": rounded(4 + 21 * mass),
+            "speed_rpm": rounded(rpm),
+        },
+    }
+
+
+def random_cases(count=200):
+    """The first cases of the sequence."""
+    points = qmc.Sobol(6, seed=SEED).random(256)[:count]
     return [
-        {
-            "load": LOADS[int(3 * load)],
-            "joint": JOINTS[int(3 * joint)],
-            "clearance_mm": rounded(10 ** (2 * clearance - 2)),
-            "machine": {
-                "rod_mass_kg": rounded(2 + 6 * rod),
-                "reciprocating_mass_kg": rounded(4 + 21 * mass),
-                "speed_rpm": rounded(100 * 15**speed),
-            },
-        }
-        for load, joint, clearance, rod, mass, speed in np.random.default_rng(seed).random(
-            (count, 6)
-        )
+        drawn(load, joint, clearance, rod, mass, 100 + 1400 * speed)
+        for clearance, rod, mass, speed, load, joint in points
+    ]
+
+
+def strangers(seed, count):
+    """Cases as a stranger would draw them."""
+    return [
+        drawn(*numbers, 100 * 15**speed)
+        for *numbers, speed in np.random.default_rng(seed).random((count, 6))
     ]
 
 

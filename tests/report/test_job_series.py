@@ -50,3 +50,17 @@ def test_scripts_lie_beside_the_page_and_stale_ones_go(paper_store, tmp_path, mo
     assert {path.name for path in out.glob("job-*.js")} == {
         f"job-{key}.js" for key in study.keys[1:]
     }
+
+
+def test_a_job_with_foreign_series_or_attributes_has_no_script(paper_store, monkeypatch):
+    stored = read_store(paper_store)
+    (key, *_) = stored.keys()
+    whole, own = stored.values(key, interactive.SHOWN), stored.attributes
+    monkeypatch.setattr(stored, "values", lambda *_: whole | {"time": whole["time"][:5]})
+    assert not [*job_scripts(stored, [key])]
+    monkeypatch.setattr(stored, "values", lambda *_: whole)
+    assert [*job_scripts(stored, [key])]
+    lacking = {name: one for name, one in own(0).items() if name not in ("settle", "case")}
+    monkeypatch.setattr(type(stored), "attributes", lambda rows, position: lacking)
+    assert not [*job_scripts(stored, [key])]
+    assert stored.case_at(0) is None

@@ -42,6 +42,13 @@ def test_another_integrator_finds_the_same(method):
         assert float(one.energy_residual) < 1e-5
 
 
+@pytest.mark.parametrize("joint", ["big_end", "both"])
+def test_the_promise_is_kept(joint):
+    exact = run({"joint": joint}, rtol=1e-11)
+    assert apart(exact, run({"joint": joint}, accuracy="standard")) < 5e-3
+    assert apart(exact, run({"joint": joint}, accuracy="fine")) < 1e-4
+
+
 def test_errors_fall_with_the_tolerance():
     """A corner that a step passes over would leave an error that the tolerance does not lower."""
     exact = run({}, rtol=1e-12)

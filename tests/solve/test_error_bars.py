@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from random_cases import strangers
+from random_cases import random_cases
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS, NUMBERS, SERIES
@@ -16,7 +16,7 @@ from compressor.solve.solution import solve
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5}
 BOTH = {"joint": "both", "clearance_mm": 0.2}
-EIGHT = strangers(2021, 8)
+EIGHT = random_cases(8)
 ERRORS = [f"{name}_error" for name in (*METRICS, *SERIES)]
 APART = {name: np.zeros(2) if "joint" in dims else 0.0 for name, (dims, _, _) in SERIES.items()}
 
@@ -121,7 +121,7 @@ def test_bars_cover_most_true_errors(eight):
     covered = np.concatenate([within(*pair) for pair in eight])
     assert covered.mean() >= 0.9
     # and no more than needed: they do not cover when they are ten times shorter
-    assert np.concatenate([within(*pair, stretch=0.1) for pair in eight]).mean() < 0.75
+    assert np.concatenate([within(*pair, stretch=0.1) for pair in eight]).mean() < 0.7
 
 
 @pytest.mark.parametrize("values", EIGHT[:4])

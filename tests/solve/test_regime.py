@@ -18,6 +18,7 @@ from compressor.solve.request import Trajectory
 from compressor.solve.search import (
     LOOK_RTOL,
     LOOK_SHIFT,
+    MIN_WORK,
     SURE_FACTOR,
     Parting,
     Search,
@@ -117,13 +118,15 @@ def searched(of, *runs):
     return search
 
 
-def compared(monkeypatch, *found):
-    """Comparisons that end as they are told to."""
+def compared(monkeypatch, *found, needs=1000):
+    """Comparisons that end as they are told to; they need so many evaluations, or stop before."""
     asked, ends = [], itertools.chain(found, itertools.repeat(found[-1]))
 
     def compare(of, end, rtol, shift, timeout):
-        asked.append((end / of.turn, rtol))
-        return next(ends)
+        asked.append((end / of.turn, rtol, of.solve.max_steps))
+        allowed = 2 * 6 * of.solve.max_steps
+        one = next(ends) if needs <= allowed else Parting(0.0, False, False)
+        return one._replace(evaluations=min(needs, allowed))
 
     monkeypatch.setattr(search_module, "compare_shifted", compare)
     return asked
@@ -141,7 +144,21 @@ def test_motions_that_part_at_a_loose_tolerance_alone_are_no_chaos(monkeypatch):
     assert not search.parts(whole=True)
     assert math.isnan(search.horizon)
     assert not search.stopped
-    assert asked == [(4.0, LOOK_RTOL), (pytest.approx(0.15), TIGHTER)]
+    assert [row[:2] for row in asked] == [(4.0, LOOK_RTOL), (pytest.approx(0.15), TIGHTER)]
+
+
+@pytest.mark.parametrize("needs", [1000, 12_000_000, 10**9])
+def test_a_search_takes_no_more_than_its_budget(monkeypatch, needs):
+    """In evaluations: the clock does not count."""
+    of = case()
+    asked = compared(monkeypatch, Parting(of.duration, False, True), needs=needs)
+    search = searched(of, 60_000)
+    search.parts(whole=False)
+    search.parts(whole=True)
+    assert search.shifted_evaluations <= MIN_WORK
+    assert asked
+    assert search.stopped == (needs > 1000)
+    assert search.horizon == math.inf or search.stopped
 
 
 def test_a_case_that_needs_more_than_its_budget_is_refused_in_these_words(monkeypatch):

@@ -51,7 +51,7 @@ class ModelTable:
     rows: tuple[ModelRow, ...]
     unknown: tuple[str, ...]
 
-    def most(self, n: int) -> list[ModelRow]:
+    def rank_rows(self, n: int) -> list[ModelRow]:
         """Return the rows that are seen to move a measure, what moves it most first."""
         rows = [row for row in self.rows if abs(row.changes[n]) > 0.0]  # which nan is not
         return sorted(rows, key=lambda row: -abs(row.changes[n]))
@@ -134,7 +134,7 @@ def list_changes(table: ModelTable) -> Iterator[str]:
     """Yield for each metric what moves it most, what has no number, and what runs assume."""
     rows, still = [], []
     for n, (m, value, bar) in enumerate(zip(table.measures, table.values, table.bars, strict=True)):
-        most = table.most(n)
+        most = table.rank_rows(n)
         number = f"{by_bar(value, bar, m.is_relative, bare=True)} {m.unit}".rstrip()
         rows += [(m.title, number)] if most else []
         rows += [(f"  {row.name}", row.cells[n]) for row in most[:MOST_SHOWN]]
