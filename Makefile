@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-oldest test-pure check format calibration accuracy validation wear claims page sweep-bench peers tradeoff chaotic regimes identify calibrate nameplate stress chaos mutants measurements pages docs release lock alarms clean
+.PHONY: help install run figures test test-bare test-oldest test-pure check format calibration accuracy validation claims page sweep-bench peers tradeoff chaotic identify nameplate stress chaos mutants measurements pages docs release lock clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -71,9 +71,6 @@ sweep-bench: install  ## measure start-up and 100,000 short jobs, killed three t
 validation: install  ## compare with what others have published (a minute)
 	$(CAMPAIGN)/measure_validation.py tests/results/validation.json
 
-wear: install  ## measure wear by steps, and on machines drawn at random (two minutes)
-	$(CAMPAIGN)/measure_wear.py tests/results/wear.json
-
 peers: install  ## time other tools and ours in turn on one problem (about six minutes)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,peers]'
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check numbalsoda \
@@ -86,15 +83,6 @@ tradeoff: install  ## measure speed against accuracy, and what the model's featu
 
 chaotic: install  ## compare averages of chaotic motions by two integrators (ten minutes)
 	$(CAMPAIGN)/measure_chaotic.py tests/results/chaotic.json
-
-regimes: install  ## follow a machine over its clearance, up and down (three minutes)
-	$(CAMPAIGN)/measure_regimes.py tests/results/regimes.json
-
-calibrate: install  ## measure what calibrate makes of known machines and of others (15 minutes)
-	$(CAMPAIGN)/measure_calibrate.py tests/results/calibrate.json
-
-alarms: install  ## measure which alarm sees wear of the nameplate machine first (ten minutes)
-	$(CAMPAIGN)/measure_alarms.py tests/results/alarms.json
 
 identify: install  ## measure what is identified of other machines, and under another friction law (15 minutes)
 	$(CAMPAIGN)/measure_identify.py tests/results/identify.json
@@ -111,7 +99,7 @@ nameplate: install  ## run the case file of compsim init machine, for its page (
 mutants: install  ## plant bugs and see whether the fast tests catch them (half an hour)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-measurements: test-oldest calibration accuracy validation wear claims page tradeoff chaotic regimes identify nameplate sweep-bench peers pages  ## all of these (about three hours)
+measurements: test-oldest calibration accuracy validation claims page tradeoff chaotic identify nameplate sweep-bench peers pages  ## all of these (about three hours)
 
 pages: install  ## write the pages' generated tables, compressor/API.md
 	$(BIN)/python tests/page_tables.py
@@ -137,6 +125,6 @@ lock:  ## write the versions that a fresh environment for tests and site gets: .
 	    echo "# pip install -c .ci/requirements.lock -e '.[dev,docs]'"; \
 	    "$$place/bin/python" -m pip --disable-pip-version-check freeze --exclude-editable; } > .ci/requirements.lock
 
-clean:  ## remove results, report, claims, stress, alarms, identify, site, dist and caches; .venv stays
-	rm -rf results report claims stress alarms identify site dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+clean:  ## remove results, report, claims, stress, identify, site, dist and caches; .venv stays
+	rm -rf results report claims stress identify site dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

@@ -15,7 +15,6 @@ from datetime import date
 from importlib import metadata
 from itertools import groupby
 from pathlib import Path
-from statistics import median
 
 from page_tables import FINDINGS, RESULTS, kept, markdown, within_bars, write_blocks
 
@@ -193,16 +192,6 @@ def validation(found):
     })  # fmt: skip
 
 
-def wear(found):
-    machines = found["machines"]
-    errors = [row["error"] for row in machines if not row["reason"]]
-    names = {f"one machine, steps of {1e3 * row['step_mm']:g} µm": f"{row['hours']:.3%}"
-             for row in found["convergence"]["rows"]}  # fmt: skip
-    names |= {f"{len(errors)} random machines, default step: {words}": f"{of(errors):.2%}"
-              for words, of in (("median", median), ("largest", max))}  # fmt: skip
-    return markdown(["machine and step", "error of the hours"], [*map(list, names.items())])
-
-
 def three(rows, key, digits):
     """Return a number of each of the three clearance configurations."""
     return " / ".join(number(row[key], digits) if key in row else "–" for row in rows)
@@ -309,51 +298,6 @@ def identify(found):
     return flipped(found["models"], columns, "friction law of the records")
 
 
-def calibrate(found):
-    others = found["others"]
-
-    def fit(key, of):
-        one = of["keys"][key]
-        return f"{one['inside']}, {one['width']:.0%}"
-
-    keys = [*next(iter(others.values()))["keys"]]
-    lines = [[f"`{key}`", *(fit(key, of) for of in others.values())] for key in keys]
-    lines.append(["machines", *(str(of["machines"]) for of in others.values())])
-    lines.append(["reported as not fitting", *(str(of["said_not_to_fit"])
-                                               for of in others.values())])  # fmt: skip
-    return markdown(["machine differs from the model by", *others], lines)
-
-
-def alarms(found):
-    def first(row):
-        if row["first_low"] is None:
-            return "never"
-        most = f"> {row['clearances'][-1]:g}"
-        low, high = (most if row[f"first_{end}"] is None else f"{row[f'first_{end}']:g}"
-                     for end in ("low", "high"))  # fmt: skip
-        return f"{'never' if row['first'] is None else format(row['first'], 'g')} [{low}, {high}]"
-
-    def noisy(row, noise):
-        if row["alarm"] == "velocity of the body":  # a stored metric, without the noise
-            return "–"
-        same = ("noise", "joint", "alarm")
-        wanted = row | {"noise": noise}
-        return next(first(one) for one in found["rows"] if all(one[n] == wanted[n] for n in same))
-
-    columns = {
-        "worn joint": lambda row: row["joint"].replace("_", " "),
-        "alarm, with its best filter": lambda row: f"{row['alarm']}, {row['filter']}",
-        "false alarms, %": lambda row: f"{100 * row['false_alarms']:.2g}",
-        "detects from, mm": first,
-    }  # fmt: skip
-    for noise in sorted({row["noise"] for row in found["rows"]} - {0}):
-        columns[f"with noise of {noise:g} m/s²"] = lambda row, noise=noise: noisy(row, noise)
-    columns["hours before the limit"] = "lead_hours:g"
-    # an alarm that never detects is a row of the JSON file alone
-    rows = [row for row in found["rows"] if not row["noise"] and row["first_low"] is not None]
-    return table(rows, columns)
-
-
 DRAWN = {"laws": "other laws", "features": "features"}
 
 
@@ -388,30 +332,6 @@ def mutants(found):
     return markdown(["kind of bug", "bugs", "change no result", "caught", "not caught"], lines)
 
 
-def regimes(found):
-    def motion(row):
-        if row["regime"] != "periodic":
-            return row["regime"]
-        return f"period {row['period']:g}" if row["period"] else ""
-
-    def span(name, form):
-        def text(rows):
-            known = [row[name] for row in rows if row[name] is not None]
-            ends = [format(end(known), form) for end in (min, max)] if known else ["–"]
-            return " to ".join(dict.fromkeys(ends))
-
-        return text
-
-    upwards = [row for row in found["rows"] if row["direction"] == "up"]
-    text = table([[*rows] for _, rows in groupby(upwards, motion)], {
-        "clearance, mm": span("value", ".4g"), "values": len,
-        "motion": lambda rows: motion(rows[0]), "Poincaré points": span("points", "g"),
-        "Lyapunov exponent, 1/rev": span("exponent", ".2f"), "its error": span("error", ".2g"),
-    })  # fmt: skip
-    differ = ", ".join(f"{value:.4g}" for value in found["differ"])
-    return f"{text}\nUp and down differ at {differ or 'no'} mm.\n"
-
-
 def nameplate(found):
     rows = [{"name": name, **row} for name, row in found["oils"].items()]
     return table(rows, {"oil": "name", "peak force, N": "force:.3g",
@@ -428,11 +348,7 @@ CAMPAIGNS = {
     "stress": ("What happens in extreme cases?", stress),
     "chaotic": ("Can averages of chaotic motion be trusted?", chaotic),
     "claims": ("Which of the paper's claims hold?", claims),
-    "regimes": ("How does the motion change with the clearance?", regimes),
-    "wear": ("How accurate are hours until a limit?", wear),
-    "alarms": ("Which alarm sees wear first?", alarms),
     "identify": ("Does `compsim identify` find the worn joint?", identify),
-    "calibrate": ("Does `compsim calibrate` find a machine's parameters?", calibrate),
     "chaos": ("Do results survive kills, power cuts and damage?", chaos),
     "mutants": ("Would the tests notice a bug?", mutants),
     "sweep": ("How many jobs a second, and does an interrupted sweep lose one?", sweep),

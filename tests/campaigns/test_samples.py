@@ -1,18 +1,13 @@
 """Samples of campaigns, run again: they give what is kept."""
 
 import measure_validation
-import measure_wear
 import pytest
 from measure_chaotic import OTHER, compare_rms
 from measure_claims import CLAIMS, judged_alone
-from measure_regimes import ALONG
 from page_tables import kept
 from published import guided
 
 from compressor.cases.case import Case
-from compressor.cases.examples import templates
-from compressor.studies.follow.follow import load_values, machines
-from compressor.studies.follow.motion import run_value
 
 
 @pytest.mark.compiled
@@ -48,29 +43,9 @@ def test_the_default_machine_has_its_margins_of_claims():
         assert abs(stored["margin"][claim - 1] - found["margin"][claim - 1]) <= both, claim
 
 
-def test_the_first_value_that_is_followed_has_its_exponent():
-    (machine,) = machines(load_values(templates()["regimes"].path, ALONG), ALONG)
-    found = run_value(machine.chains[0].cases[0], None, ALONG.points, ALONG.exponent)
-    row = kept("regimes.json")["rows"][0]
-    assert found["regime"] == row["regime"] == "periodic"
-    assert float(found["period"]) == row["period"]
-    away = abs(float(found["lyapunov_exponent"]) - row["exponent"])
-    assert away <= float(found["lyapunov_exponent_error"]) + row["error"]
-
-
 @pytest.mark.slow
 def test_a_chaotic_case_says_so_and_knows_its_rms():
     row = compare_rms({"joint": "both", "clearance_mm": 0.2}, OTHER)
     assert row["regime"] == "chaotic"
     assert row["apart"] < 4.0  # standard errors
     assert row["known"] < 0.1
-
-
-@pytest.mark.slow
-def test_a_machine_that_wears_has_its_hours():
-    rows = kept("wear.json")["machines"]
-    row = min(rows, key=lambda row: row["values"]["clearance_mm"])  # fewest steps
-    hours, _, reason = measure_wear.followed(row["values"], measure_wear.DEFAULT)
-    assert reason == row["reason"] == ""
-    # last bits of a run move the hours by 1e-4
-    assert abs(hours / row["hours"] - 1.0) == pytest.approx(row["error"], abs=1e-3)

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from compressor.cases import Wear
 from compressor.cases.case import Case
 from compressor.solve import simulate
 from compressor.studies.wear import Worn, follow_stage, life
@@ -80,6 +81,14 @@ def test_a_coefficient_is_a_scale_of_hours(machine):
     assert other.hours == pytest.approx(one.hours / 10, rel=1e-5)
     assert (one.low, one.high) == pytest.approx((one.hours / 2, one.hours * 2))
     assert one.joint == "big_end"
+
+
+def test_the_default_step_is_short_enough():
+    """Against a quarter of it; 40 random machines were off by 0.02 % in the median, once by 2 %."""
+    steps = Wear().step_mm, Wear().step_mm / 4
+    pairs = [followed({"step_mm": step}) for step in steps]
+    coarse, fine = (life(of, of.to_dataset(stages)).hours for of, stages in pairs)
+    assert coarse == pytest.approx(fine, rel=2e-3)
 
 
 def test_a_life_beyond_the_hours_is_not_told(machine):
