@@ -52,8 +52,10 @@ def test_a_run_says_what_it_did_and_what_comes_next(case_file, compsim):
     assert "\r" not in err
     manifest = read_studies("out dir")[0]
     assert manifest.command == "compsim run two.yaml one.yaml -j 1 -r 'out dir'"
+    stamps = {path: path.stat().st_mtime_ns for path in Path("out dir").glob("*/*")}
     again = compsim("run", "two.yaml", "one.yaml", "-r", "out dir")
     assert again.out == out
+    assert {path: path.stat().st_mtime_ns for path in Path("out dir").glob("*/*")} == stamps
     assert again.err.startswith("nothing to do: all 3 jobs are stored in out dir\n")
 
 
@@ -105,7 +107,7 @@ def test_plan_tells_what_a_run_will_do_and_stores_nothing(case_file, compsim):
     assert found["first"][0]["coordinates"] == {"load": "none"}
     assert found["seconds"] > 0
 
-    compsim("run", *both)
+    assert "6 jobs run in" in compsim("run", *both).err
     size = sum(path.stat().st_size for path in Path("results/batches").iterdir())
     assert 1 < found["bytes"] / size < 1.02  # rows, too
     out = compsim("plan", "many.yaml", "--set", "load=[spring, none]", "-j", "1").out.splitlines()
@@ -120,15 +122,17 @@ def test_plan_tells_what_a_run_will_do_and_stores_nothing(case_file, compsim):
 
 
 def test_shards(case_file, compsim):
-    case_file("two.yaml", load=["none", "spring", "gas"])
-    ran = 0
-    for part in ("1/2", "2/2"):
-        out, err = compsim("run", "two.yaml", "-j", "1", "--shard", part, "--quiet")
-        ran += int(out.split()[1])
+    """One of the jobs is of both studies."""
+    case_file("two.yaml", load=["none", "spring"], machine={"rod_mass_kg": [4, 5, 6]})
+    case_file("one.yaml", load="none", machine={"rod_mass_kg": 5})
+    both, ran = ["two.yaml", "one.yaml", "-j", "1"], 0
+    for part in ("1/3", "2/3", "3/3"):
+        out, err = compsim("run", *both, "--shard", part, "--quiet")
+        ran += sum(int(line.split()[1]) for line in out.splitlines())
         assert err == ""  # as all is well
-    assert ran == 3
+    assert ran == 6 + 1  # no job is in two parts
     Path("results/studies/other.json").write_text("{}")  # damage of another study is no matter
-    assert "nothing to do: all 3 jobs" in compsim("run", "two.yaml", "-j", "1").err
+    assert "nothing to do: all 6 jobs" in compsim("run", *both).err
 
 
 def test_verify_finds_damage_that_a_run_mends(case_file, compsim):

@@ -15,7 +15,6 @@ from compressor.store.studies import (
     find_study,
     find_value,
     read_studies,
-    seal,
     study_paths,
     write_study,
 )
@@ -32,16 +31,6 @@ def test_a_study_is_stored_and_found(tmp_path):
     assert (found.again.overrides, found.again.jobs) == (("joint=none",), 4)
     assert found.axes == (Axis("machine.speed_rpm", (300, 500)), Axis("load", ("spring", "none")))
     assert list(points(found))[1] == {"machine.speed_rpm": 300, "load": "none"}
-
-
-def test_a_study_is_read_whose_axes_have_their_units(tmp_path):
-    """As they had until they were those of a case file."""
-    write_study(tmp_path, study("speeds", machine={"speed_rpm": [300, 500]}))
-    (found,) = read_studies(tmp_path)
-    plain = vars(found) | {"axes": [vars(axis) | {"units": "rpm"} for axis in found.axes]}
-    head = json.dumps(plain, indent=1).removesuffix("\n}").encode()
-    (tmp_path / "studies/speeds.json").write_bytes(seal(head))
-    assert read_studies(tmp_path) == [found]
 
 
 def test_storing_a_study_again_leaves_its_file_alone_and_a_changed_one_takes_its_place(tmp_path):
@@ -71,9 +60,6 @@ def test_a_damaged_study_is_named_with_a_remedy_and_run_again(text, tmp_path):
     path.rename(tmp_path / "studies/two.json")
     with pytest.raises(StoreError, match=r"two\.json: is damaged"):
         read_studies(tmp_path)
-
-
-# ---- folders ------------------------------------------------------------------------------------
 
 
 def test_a_file_is_no_folder_of_results(tmp_path):

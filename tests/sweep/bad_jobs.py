@@ -127,15 +127,6 @@ def crash_once(folder, at, payload):
     return payload
 
 
-def die_amid(pid, payload):
-    """Interrupt the parent, amid a long job."""
-    if payload == 50:
-        os.kill(pid, signal.SIGINT)
-        time.sleep(60)
-    time.sleep(0.002)
-    return payload
-
-
 def store(folder, results):
     """Store a batch of results in one file; return what it is called, for each."""
     name = f"{os.getpid()}-{time.monotonic_ns()}"

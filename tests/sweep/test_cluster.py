@@ -151,11 +151,6 @@ def test_workers_with_other_programs_are_refused(dask, studies, tmp_path, monkey
         sweep(studies[1:], tmp_path / "out", options=Options(backend=backend))
 
 
-@pytest.fixture
-def impatient(monkeypatch):
-    monkeypatch.setattr(cluster, "CONNECT_SECONDS", 1.0)
-
-
 def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path):
     told = []
     with distributed.LocalCluster(
@@ -172,7 +167,8 @@ def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path)
     assert told.count(cluster.WAITING) == 1
 
 
-def test_no_scheduler_is_a_mistake(studies, tmp_path, capsys, impatient):
+def test_no_scheduler_is_a_mistake(studies, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(cluster, "CONNECT_SECONDS", 1.0)
     options = ["--scheduler", "tcp://127.0.0.1:1"]
     assert main(["run", studies[0].path, "-r", str(tmp_path / "out"), *options]) == 2
     assert "no scheduler answers" in capsys.readouterr().err

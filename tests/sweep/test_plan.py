@@ -8,7 +8,6 @@ from conftest import write_cases
 from compressor.cases.load import load_studies
 from compressor.sweep import plan
 from compressor.sweep.plan import add_times, forecast
-from compressor.sweep.sweep import sweep
 from compressor.sweep.warm_up import Part
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
@@ -16,38 +15,17 @@ NINE = {"machine": {"rod_mass_kg": {"linspace": [3, 5, 9]}}}
 
 
 @pytest.fixture
-def studies(tmp_path, monkeypatch, in_process):
+def studies(tmp_path, monkeypatch):
     """Makes the studies of some values by name, in the present folder (JSON is YAML)."""
     monkeypatch.chdir(tmp_path)
 
-    def make(only="", **values):
+    def make(**values):
         whole = {name: {"output": {"keep": "metrics"}, **content,
                         "solve": SHORT | content.get("solve", {})}
                  for name, content in values.items()}  # fmt: skip
-        return load_studies(*write_cases(Path(), **whole), only=only)
+        return load_studies(*write_cases(Path(), **whole))
 
     return make
-
-
-def counts(found):
-    return [(part.study, part.jobs, part.done, part.missing) for part in found[0].studies]
-
-
-def test_counts_follow_from_the_store_and_shared_jobs_count_once(studies):
-    both = studies(one=NINE, two={"machine": {"rod_mass_kg": [3, 4, 7]}})
-    assert counts(forecast(both, "results", 0)) == [("one", 9, 0, 9), ("two", 1, 0, 1)]
-    sweep(studies("machine.rod_mass_kg < 3.6", one=NINE), "results", 1)
-    found, missing = forecast(both, "results", 3)
-    assert counts((found, missing)) == [("one", 9, 3, 6), ("two", 1, 0, 1)]
-    assert (found.jobs, found.done, found.missing, len(missing)) == (10, 3, 7, 7)
-    assert [one.coordinates["machine.rod_mass_kg"] for one in found.first] == [3.75, 4.0, 4.25]
-    assert len(forecast(both, "results", 50)[0].first) == 7
-
-    series = studies(one={**NINE, "output": {"keep": "series"}})  # which stored jobs do not serve
-    assert counts(forecast(series, "results", 0)) == [("one", 9, 0, 9)]
-    selected = forecast(studies("machine.rod_mass_kg > 4", one=NINE), "results", 1)
-    assert counts(selected) == [("one", 4, 0, 4)]
-    assert selected[0].first[0].coordinates == {"machine.rod_mass_kg": 4.25}
 
 
 def timed_as(monkeypatch, seconds, size=0):
@@ -99,10 +77,3 @@ def test_a_job_that_is_timed_is_a_job_of_the_sweep(studies, monkeypatch):
     assert plan.time_job(case)[0] == 2.0
     clock = iter([0.0, 60.0])
     assert plan.time_job(case)[0] == 60.0  # a long one runs once
-
-
-def test_nothing_ahead_costs_nothing(studies):
-    made = studies(one=NINE)
-    sweep(made, "results", 1)
-    found = add_times(*forecast(made, "results", 5), 2, pytest.fail)
-    assert (found.missing, found.seconds, found.bytes, found.first) == (0, 0, 0, ())

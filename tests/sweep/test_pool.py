@@ -87,21 +87,18 @@ def test_jobs_are_read_as_they_are_needed():
     ends.close()
 
 
-def test_a_worker_has_none_of_our_files(tmp_path):
+def test_a_worker_has_none_of_our_files_and_one_thread(tmp_path, monkeypatch):
     """A lock that we hold would else outlive us in a worker; what it prints is no data."""
+    monkeypatch.setenv("OMP_NUM_THREADS", "8")
+    names = ["files", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"]
     with open(tmp_path / "lock", "w") as lock:
         os.set_inheritable(lock.fileno(), True)
         fcntl.flock(lock, fcntl.LOCK_EX)
-        (files,) = results(run_batches(bad_jobs.look, named(["files"]), Workers(1))).values()
+        files, *threads = results(run_batches(bad_jobs.look, named(names), Workers(1))).values()
     assert not [name for name in files if "lock" in name]
     assert files[0] == os.devnull
     assert files[1] == files[2]
-
-
-def test_numeric_libraries_have_one_thread_in_a_worker(monkeypatch):
-    monkeypatch.setenv("OMP_NUM_THREADS", "8")
-    names = ["OMP_NUM_THREADS", "NUMBA_NUM_THREADS"]
-    assert [*results(run_batches(bad_jobs.look, named(names), Workers(1))).values()] == ["1", "1"]
+    assert threads == ["1", "1"]
 
 
 def test_what_is_prepared_is_not_timed(tmp_path):
@@ -265,29 +262,6 @@ def test_a_worker_s_end_is_known_where_our_starter_ignores_it():
     assert [end.reason for end in lost(ends).values()] == ["worker_died"]
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_results_that_came_before_an_interruption_are_kept(workers):
-    ends = []
-    interrupting = partial(bad_jobs.die_amid, os.getpid())
-    rules = Workers(workers, target_seconds=0.01)
-    began = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
-        ends.extend(run_batches(interrupting, named(range(100)), rules))
-    assert time.monotonic() - began < 30
-    # a worker that has not begun yet holds a batch, of one job at first
-    assert len(results(ends).keys() & set(range(30))) > 30 - workers
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_what_the_jobs_raise_comes_through(workers):
-    def jobs():
-        yield from named(range(30))
-        raise LookupError("no more")
-
-    with pytest.raises(LookupError, match="no more"):
-        list(run_batches(work, jobs(), Workers(workers)))
-
-
 PARENT = """
 import bad_jobs, signal, sys
 from compressor.sweep.pool import run_batches
@@ -300,10 +274,13 @@ list(run_batches(bad_jobs.announced, jobs, Workers(2)))
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
-def test_no_process_outlives_its_parent(number):
+def test_no_process_outlives_its_parent(number, tmp_path):
+    """A script without a guard: workers do not run the caller's main module."""
+    script = tmp_path / "script.py"
+    script.write_text(PARENT)
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
     parent = subprocess.Popen(
-        [sys.executable, "-c", PARENT], stderr=subprocess.PIPE, text=True, start_new_session=True,
+        [sys.executable, script], stderr=subprocess.PIPE, text=True, start_new_session=True,
         env=environment,
     )  # fmt: skip
     pids = [int(parent.stderr.readline()) for _ in range(2)]
@@ -313,21 +290,6 @@ def test_no_process_outlives_its_parent(number):
     wait_for(lambda: not any(map(is_running, pids)))
     assert parent.stderr.read() == ""  # until the last process of all has ended
     parent.stderr.close()
-
-
-UNGUARDED = """
-import bad_jobs
-from compressor.sweep.pool import run_batches, Workers
-print(sorted(end.result for end in run_batches(bad_jobs.work, bad_jobs.named([1, 2]), Workers(2))))
-"""
-
-
-def test_a_script_needs_no_guard(tmp_path):
-    """Workers do not run the caller's main module."""
-    (tmp_path / "script.py").write_text(UNGUARDED)
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
-    words = [sys.executable, tmp_path / "script.py"]
-    assert subprocess.check_output(words, text=True, env=environment) == "[1, 2]\n"
 
 
 # ---- settings -----------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from compressor.store import reader as store
 from compressor.store.files import StoreError
 from compressor.store.status import verify
 from compressor.sweep import warm_up
-from compressor.sweep.sweep import JobFailure, Options, sweep
+from compressor.sweep.sweep import sweep
 from compressor.sweep.wanted import RequestedJobs
 from compressor.sweep.worker import attempt
 
@@ -42,47 +42,8 @@ def studies(tmp_path):
     return make
 
 
-def stamps(folder):
-    return {path.name: path.stat().st_mtime_ns for path in folder.glob("*/*")}
-
-
 def statuses(folder, study):
     return [store.read_store(folder).status(case.key).status for case in study.cases]
-
-
-def test_a_failed_job_leaves_the_others_be(studies, tmp_path, in_process):
-    made = studies(budget={**BOTH, "solve": {"max_steps": [5, 10**6]}, "load": ["none", "spring"]})
-    summary = sweep(made, tmp_path / "out", 2)
-    assert statuses(tmp_path / "out", made[0]) == ["failed", "failed", "ok", "ok"]
-    assert (summary.done_before, summary.run_now, summary.counts) == (0, 4, {"budget": 4})
-    assert len(summary.failed) == 2
-    assert summary.failed[0] == JobFailure(
-        "budget",
-        {"solve.max_steps": 5, "load": "none"},
-        made[0].cases[0].key,
-        "budget_steps",
-        "more than 5 steps",
-    )
-
-
-def test_a_second_sweep_does_nothing_and_still_tells_what_failed(studies, tmp_path, in_process):
-    made = studies(budget={**BOTH, "solve": {"max_steps": [5, 10**6]}})
-    first = sweep(made, tmp_path / "out", 1)
-    before = stamps(tmp_path / "out")
-    second = sweep(made, tmp_path / "out", 1)
-    assert (second.done_before, second.run_now) == (2, 0)
-    assert second.failed == first.failed
-    assert stamps(tmp_path / "out") == before
-
-
-def test_studies_share_jobs(studies, tmp_path, in_process):
-    made = studies(
-        one={"machine": {"rod_mass_kg": [4, 5]}}, two={"machine": {"rod_mass_kg": [5, 6]}}
-    )
-    summary = sweep(made, tmp_path / "out", 1)
-    assert summary.run_now == len(store.read_store(tmp_path / "out").keys()) == 3
-    assert summary.counts == {"one": 2, "two": 2}
-    assert store.open_study(tmp_path / "out").sizes["job"] == 4
 
 
 @pytest.mark.parametrize(
@@ -123,20 +84,6 @@ def test_damage_is_mended_by_the_same_run(kind, damage, studies, tmp_path, in_pr
     assert verify(tmp_path / "out") == []
     assert statuses(tmp_path / "out", made[0]) == ["ok", "ok"]
     assert any(str(victim) in remark for remark in told) == (kind == "batches")
-
-
-def test_shards_are_one_study_together(studies, tmp_path, in_process):
-    axes = {"load": ["none", "spring"], "machine": {"rod_mass_kg": [3, 4, 5, 6]}}
-    made = studies(one=axes, same={"load": "none"})
-    parts = [
-        sweep(made, tmp_path / "out", 1, options=Options(part=(number, 3))) for number in (1, 2, 3)
-    ]
-    assert all(part.done_before == 0 for part in parts)
-    assert sum(part.run_now for part in parts) == len(RequestedJobs(made)) == 9
-    assert sweep(made, tmp_path / "out", 1).run_now == 0
-    whole = {key for study in made for key in study.keys}
-    assert store.read_store(tmp_path / "out").keys() == whole
-    assert verify(tmp_path / "out") == []
 
 
 def test_damaged_numbers_are_mended_with_series_as_exact_as_they_were(
