@@ -28,9 +28,12 @@ def kept_of(path):
             "jobs": study.jobs, "keys": keys, "name": study.name}  # fmt: skip
 
 
-def test_keys_of_random_cases_are_those_kept():
-    moved = [values for values, key in FROZEN["cases"] if Case.resolve(values).key != key]
-    assert not moved
+def test_keys_of_random_cases_are_those_kept_and_they_read_back():
+    for values, key in FROZEN["cases"]:
+        case = Case.resolve(values)
+        assert case.key == key, values
+        assert Case.resolve(case.values()) == case, values
+        assert Case.from_attribute(case.attributes()["case"]) == case, values
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)

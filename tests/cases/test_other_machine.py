@@ -26,20 +26,16 @@ gas:
 """
 
 
-def test_its_contact_is_told_to_be_of_another_pin(read):
+def test_its_contact_is_told_to_be_of_another_pin(read, tmp_path, capsys, in_process):
+    """On its page, by status and show."""
     (case,) = read("load: gas" + MACHINE).cases
-    note = paper_notes(case)["contact.stiffness_N_per_mm15"]
-    assert note.startswith("336000 N/mm^1.5 is the paper's, of a pin of 10 mm radius: give contact")
     given = replace(case, contact=replace(case.contact, stiffness_N_per_mm15=5e6))
     assert paper_notes(given) == {}
-
-
-def test_its_page_and_its_status_tell_that_too(read, tmp_path, capsys, in_process):
-    (case,) = read("load: gas" + MACHINE).cases
     (tmp_path / "nl.yaml").write_text("load: gas" + MACHINE + "solve: {duration_rev: 2}\n")
     for words in (["run", "nl.yaml", "-j", "1"], ["report"], ["status"]):
         assert cli.main(words) == 0
     note = paper_notes(case)["contact.stiffness_N_per_mm15"]
+    assert note.startswith("336000 N/mm^1.5 is the paper's, of a pin of 10 mm radius: give contact")
     assert note in html.unescape((tmp_path / "report/index.html").read_text())
     assert note in " ".join(capsys.readouterr().out.split())
     assert cli.main(["show", "nl"]) == 0

@@ -101,10 +101,12 @@ ENTRIES = {
     "machine.pin_radius_mm.big_end": Entry(12, WORN, (IDEAL, SMALL)),
     "machine.pin_radius_mm.small_end": Entry(12, WORN, (IDEAL, BIG)),
     **entries(
-        GAS, WORN, FREE, gas__piston_radius_mm=60, gas__suction_MPa=0.11,
-        gas__discharge_MPa=0.5, gas__exponent=1.3, gas__back_pressure_MPa=0.2,
+        GAS, WORN, FREE, gas__piston_radius_mm=60, gas__back_pressure_MPa=0.2,
         gas__valve_loss_percent__suction=5, gas__valve_loss_percent__discharge=5,
         gas__unloaded="head",
+    ),
+    **entries(
+        GAS, WORN, FREE, MEASURED, gas__suction_MPa=0.11, gas__discharge_MPa=0.5, gas__exponent=1.3
     ),
     "gas.head_clearance_mm": Entry(25, GAS, (WORN, FREE, CRANK_END)),
     "gas.action": Entry("crank_end", DOUBLE, (WORN, FREE)),
@@ -285,10 +287,12 @@ def test_a_key_changes_what_is_stored(key):
 
 
 @pytest.mark.parametrize("key", ENTRIES)
-def test_the_table_says_which_values_make_another_job(key):
+def test_the_table_says_which_values_make_another_job_and_they_read_back(key):
     value, where, _ = ENTRIES[key]
-    keys = {Case.from_values(values).key for values in (where, with_value(where, key, value))}
-    assert (len(keys) == 2) is table()[key].identity
+    case = Case.from_values(with_value(where, key, value))
+    assert (case.key != Case.from_values(where).key) is table()[key].identity
+    assert Case.from_values(case.values()) == case
+    assert Case.from_attribute(case.attributes()["case"]) == case
 
 
 @pytest.mark.parametrize(
