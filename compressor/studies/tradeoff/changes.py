@@ -117,10 +117,10 @@ def change(
 
 
 def change_text(measure: Measure, size: float) -> str:
-    """Return a change in percent; of a share +3.1 points, of a count a revolution +3.1."""
+    """Return a change in percent; of a share +3.1 points, of an angle +3.1 °."""
     if measure.is_relative:
         return percent(size, "+")
-    return f"{size:+z.2g} points" if measure.unit == "%" else f"{size:+z.2g}"
+    return f"{size:+z.2g} {'points' if measure.unit == '%' else measure.unit}".rstrip()
 
 
 def percent(size: float, sign: str = "") -> str:
