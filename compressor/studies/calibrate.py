@@ -25,7 +25,7 @@ from compressor.cases import Case, design, load_studies
 from compressor.program import Progress, no_progress
 from compressor.store import Folder, job_record, read_store
 from compressor.studies import frame
-from compressor.vibration import Record
+from compressor.vibration import USABLE, Record, by_revolutions
 
 # ---- a record's orders
 
@@ -51,7 +51,7 @@ def orders_of(record: Record) -> Orders:
 
     Raises RecordError as `vibration.check_record`.
     """
-    turned = frame.by_revolutions(record)
+    turned = by_revolutions(record)
     lines, speed = math.sqrt(2.0) * turned.lines(turned.highest), turned.speed
     count, highest = lines.shape
     scatter = lines.var(axis=0, ddof=1) if count > 1 else np.zeros(highest)
@@ -331,7 +331,7 @@ def calibrate(
     jobs.run_at(60.0 * measured.speed)
     sensor = jobs.middle.sensor
     assert sensor is not None
-    corner = min(sensor.low_pass_Hz or math.inf, sensor.rate_Hz / frame.USABLE)
+    corner = min(sensor.low_pass_Hz or math.inf, sensor.rate_Hz / USABLE)
     # the highest order that both hold; a job's own count may be one less by rounding
     jobs.highest = min(len(measured.amplitudes), int(corner / measured.speed * (1.0 - 1e-9)))
     if not jobs.highest:

@@ -20,7 +20,7 @@ from compressor.program import Progress, no_progress, report_progress
 from compressor.report import PlotlyFigure, make_grid, style
 from compressor.store import Folder, find_record, job_record, read_store, read_studies, report_job
 from compressor.studies import frame
-from compressor.vibration import RecordError, segment_levels
+from compressor.vibration import RecordError, Revolutions, by_revolutions, segment_levels
 
 SEGMENTS = 36
 FINE = 4  # points on a curve for each cycle of its highest order
@@ -241,7 +241,7 @@ class Comparison:
 
     name: str
     remarks: tuple[str, ...]
-    turned: frame.Revolutions
+    turned: Revolutions
     curves: Curves
     orders: int
     jobs: tuple[Compared, ...]
@@ -262,7 +262,7 @@ def compare_record(
     or orders are too few.
     """
     key, record = find_record(name, folder, hints)
-    mine = frame.by_revolutions(record)
+    mine = by_revolutions(record)
     check_orders(mine.highest, name)
     own = {mine.highest: curves(mine.lines(mine.highest))}  # by the highest order
     stored = read_store(folder, warn=True)
@@ -273,7 +273,7 @@ def compare_record(
         if other is None or case is None or not case.sensor:
             continue
         with contextlib.suppress(RecordError):  # too short, or all zero
-            theirs = frame.by_revolutions(other)
+            theirs = by_revolutions(other)
             orders = min(mine.highest, theirs.highest)
             check_orders(orders, f"job {one}")
             lines, others = mine.lines(orders), theirs.lines(orders)

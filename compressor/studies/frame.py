@@ -1,4 +1,4 @@
-"""What studies share: jobs of a study that grows, jobs with a record, a record's revolutions.
+"""What studies share: jobs of a study that grows, files that grow, jobs with a record.
 
 A study is a function of stored jobs. What it has to run it runs as ordinary jobs, so that progress,
 resume, `compsim status`, shards and a cluster serve it, too.
@@ -36,12 +36,11 @@ from compressor.store import (
     write_dataset,
 )
 from compressor.sweep import End, Options, in_this_process, needed_parts, run_here, sweep
-from compressor.vibration import Record, check_record, resample_angle, turns_at
+from compressor.vibration import Record
 
 RANGE = re.compile(r"\s*([\w.]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*(?::\s*(\d+)\s*)?")
 DIGITS = 12  # of a key's value: enough for any derivative, and short to read
 MAX_NAME = 64  # characters of a study's name
-USABLE = 2.56  # sampling rate over the highest frequency that it holds well (ISO 13373-1)
 RECORD_REMEDY = "write `body: true` and `sensor: {{length_rev: {length}}}` into {file}, keep series"
 
 Point = tuple[float, ...]  # values of keys, in the case file's units
@@ -227,6 +226,17 @@ def records(
             yield RecordedJob(key, point, *found, record)
 
 
+def no_records(source: StoredStudy, left: Mapping[str, int], revolutions: int) -> StudyError:
+    """Return the error that says why a study has no record of so many revolutions."""
+    if {*left} <= {"without_record"}:
+        remedy = RECORD_REMEDY.format(length=2 * revolutions + 1, file=source.case_file)
+        return StudyError(f"study {source.name} has no sensor's record: {remedy}, and run it again")
+    reasons = ", ".join(f"{count} {reason}" for reason, count in left.items())
+    text = f"study {source.name} has no record of {revolutions} revolutions: {reasons}"
+    remedy = f"run what is missing, or with sensor.length_rev: {revolutions + 1} or more"
+    return StudyError(f"{text}; {remedy}")
+
+
 # ---- files that grow row by row -----------------------------------------------------------------
 
 REMADE = "delete it: the same command makes it again"
@@ -354,79 +364,3 @@ def calling_often(look: Callable[[], object]) -> Iterator[None]:
     finally:
         ended.set()
         thread.join()
-
-
-# ---- records ------------------------------------------------------------------------------------
-
-
-def no_records(source: StoredStudy, left: Mapping[str, int], revolutions: int) -> StudyError:
-    """Return the error that says why a study has no record of so many revolutions."""
-    if {*left} <= {"without_record"}:
-        remedy = RECORD_REMEDY.format(length=2 * revolutions + 1, file=source.case_file)
-        return StudyError(f"study {source.name} has no sensor's record: {remedy}, and run it again")
-    reasons = ", ".join(f"{count} {reason}" for reason, count in left.items())
-    text = f"study {source.name} has no record of {revolutions} revolutions: {reasons}"
-    remedy = f"run what is missing, or with sensor.length_rev: {revolutions + 1} or more"
-    return StudyError(f"{text}; {remedy}")
-
-
-def cut_windows(record: Record, revolutions: int) -> Iterator[tuple[int, Record]]:
-    """Yield the windows of a record, each behind the number of the pulse that it begins with.
-
-    A window reaches from the last sample that is not after a pulse to the first that is not before
-    the pulse `revolutions` later, with which the next one begins.
-    """
-    for first in range(0, len(record.tacho) - revolutions, revolutions):
-        pulses = record.tacho[first : first + revolutions + 1]
-        begin = max(int(np.searchsorted(record.times, pulses[0], side="right")) - 1, 0)
-        inside = slice(begin, int(np.searchsorted(record.times, pulses[-1])) + 1)
-        since = record.times[begin]
-        times, values = record.times[inside] - since, record.values[inside]
-        yield first, Record(times, values, pulses - since, record.clipped)
-
-
-@dataclass(frozen=True)
-class Revolutions:
-    """A record by whole revolutions, at equal crank angles.
-
-    values: (revolutions, samples a revolution), m/s2; first: where the first sample is, in
-    revolutions after top dead centre, up to a step before it; speed: mean, rev/s; rate: Hz.
-    """
-
-    values: np.ndarray
-    first: float
-    speed: float
-    rate: float
-
-    @property
-    def highest(self) -> int:
-        """Return the highest order that the sampling rate holds."""
-        return math.floor(self.rate / USABLE / self.speed)
-
-    @property
-    def rpm(self) -> float:
-        """Return the mean speed in rpm."""
-        return 60.0 * self.speed
-
-    def lines(self, orders: int) -> np.ndarray:
-        """Return the orders 1, 2, ... of each revolution, complex and rms, (n, orders)."""
-        scale = math.sqrt(2.0) / self.values.shape[1]
-        found = np.fft.rfft(self.values, axis=1)[:, : orders + 1] * scale
-        return (found * np.exp(-2j * np.pi * self.first * np.arange(found.shape[1])))[:, 1:]
-
-
-def by_revolutions(record: Record, multiple: int = 2) -> Revolutions:
-    """Return a record by whole revolutions; samples a revolution are a multiple of a number.
-
-    Raises RecordError if it cannot be used.
-    """
-    whole = check_record(record.times, record.values, record.tacho)
-    turns = turns_at(record.times, record.tacho)
-    # from the last sample that is not after the first pulse: the rest then reach over all turns
-    first = max(int(np.searchsorted(turns, 0.0, side="right")) - 1, 0)
-    inside = slice(first, int(np.searchsorted(turns, whole)) + 2)
-    speed = whole / (record.tacho[-1] - record.tacho[0])
-    count = multiple * math.ceil(record.rate / speed / multiple)
-    even = resample_angle(2.0 * math.pi * turns[inside], record.values[inside], count)
-    values = even[: whole * count].reshape(-1, count)
-    return Revolutions(values, float(turns[first]), speed, record.rate)

@@ -1,6 +1,6 @@
 """What a frame does with the forces on it, and how its signals are read."""
 
-from compressor.vibration.accelerometer import Record, analogue_rate, noisy
+from compressor.vibration.accelerometer import USABLE, Record, analogue_rate, noisy
 from compressor.vibration.body import Forces
 from compressor.vibration.monitor import Monitored, measure_record, segment_levels, shake_body
 from compressor.vibration.record_files import read_record, record_columns
@@ -14,4 +14,11 @@ from compressor.vibration.spectra import (
     resample_angle,
     shape,
 )
-from compressor.vibration.tacho import MIN_REVOLUTIONS, check_record, turns_at
+from compressor.vibration.tacho import (
+    MIN_REVOLUTIONS,
+    Revolutions,
+    by_revolutions,
+    check_record,
+    cut_windows,
+    turns_at,
+)

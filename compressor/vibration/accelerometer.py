@@ -23,7 +23,7 @@ AXES = ("x", "y")
 POLES = 8  # of the anti-aliasing filter, Butterworth
 # times the sampling rate, and the highest resonance, at which the analogue side runs
 ANALOGUE_RATE_FACTOR = 8.0
-USUAL = 2.56  # sampling rate over the highest frequency of interest
+USABLE = 2.56  # sampling rate over the highest frequency that it holds well (ISO 13373-1)
 LEAD_IN = 1  # revolutions before the record, in which the low-pass filter forgets its start
 
 
@@ -132,7 +132,7 @@ def low_pass(sensor: Sensor, signal: np.ndarray, step: float) -> np.ndarray:
     """Return what a sensor's anti-aliasing filter leaves of a signal at steps (s), from rest on."""
     from scipy.signal import butter, sosfilt  # takes half a second
 
-    corner = sensor.low_pass_Hz or sensor.rate_Hz / USUAL
+    corner = sensor.low_pass_Hz or sensor.rate_Hz / USABLE
     return sosfilt(butter(POLES, corner, fs=1.0 / step, output="sos"), signal)
 
 

@@ -1,12 +1,14 @@
 """The revolutions of a record: pulses of a tacho, and the crank's turns at the samples."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import make_interp_spline, make_smoothing_spline
 
-from compressor.vibration.spectra import RecordError
+from compressor.vibration.accelerometer import USABLE, Record
+from compressor.vibration.spectra import RecordError, resample_angle
 
 MIN_REVOLUTIONS = 2  # whole revolutions of a record
 MIN_SMOOTHED = 5  # pulses of a smoothing spline
@@ -119,3 +121,65 @@ def turns_at(times: np.ndarray, tacho: np.ndarray) -> np.ndarray:
     turns = np.interp(times, tacho, np.arange(len(tacho)))
     turns += np.minimum(times - tacho[0], 0.0) / (tacho[1] - tacho[0])
     return turns + np.maximum(times - tacho[-1], 0.0) / (tacho[-1] - tacho[-2])
+
+
+def cut_windows(record: Record, revolutions: int) -> Iterator[tuple[int, Record]]:
+    """Yield the windows of a record, each behind the number of the pulse that it begins with.
+
+    A window reaches from the last sample that is not after a pulse to the first that is not before
+    the pulse `revolutions` later, with which the next one begins.
+    """
+    for first in range(0, len(record.tacho) - revolutions, revolutions):
+        pulses = record.tacho[first : first + revolutions + 1]
+        begin = max(int(np.searchsorted(record.times, pulses[0], side="right")) - 1, 0)
+        inside = slice(begin, int(np.searchsorted(record.times, pulses[-1])) + 1)
+        since = record.times[begin]
+        times, values = record.times[inside] - since, record.values[inside]
+        yield first, Record(times, values, pulses - since, record.clipped)
+
+
+@dataclass(frozen=True)
+class Revolutions:
+    """A record by whole revolutions, at equal crank angles.
+
+    values: (revolutions, samples a revolution), m/s2; first: where the first sample is, in
+    revolutions after top dead centre, up to a step before it; speed: mean, rev/s; rate: Hz.
+    """
+
+    values: np.ndarray
+    first: float
+    speed: float
+    rate: float
+
+    @property
+    def highest(self) -> int:
+        """Return the highest order that the sampling rate holds."""
+        return math.floor(self.rate / USABLE / self.speed)
+
+    @property
+    def rpm(self) -> float:
+        """Return the mean speed in rpm."""
+        return 60.0 * self.speed
+
+    def lines(self, orders: int) -> np.ndarray:
+        """Return the orders 1, 2, ... of each revolution, complex and rms, (n, orders)."""
+        scale = math.sqrt(2.0) / self.values.shape[1]
+        found = np.fft.rfft(self.values, axis=1)[:, : orders + 1] * scale
+        return (found * np.exp(-2j * np.pi * self.first * np.arange(found.shape[1])))[:, 1:]
+
+
+def by_revolutions(record: Record, multiple: int = 2) -> Revolutions:
+    """Return a record by whole revolutions; samples a revolution are a multiple of a number.
+
+    Raises RecordError if it cannot be used.
+    """
+    whole = check_record(record.times, record.values, record.tacho)
+    turns = turns_at(record.times, record.tacho)
+    # from the last sample that is not after the first pulse: the rest then reach over all turns
+    first = max(int(np.searchsorted(turns, 0.0, side="right")) - 1, 0)
+    inside = slice(first, int(np.searchsorted(turns, whole)) + 2)
+    speed = whole / (record.tacho[-1] - record.tacho[0])
+    count = multiple * math.ceil(record.rate / speed / multiple)
+    even = resample_angle(2.0 * math.pi * turns[inside], record.values[inside], count)
+    values = even[: whole * count].reshape(-1, count)
+    return Revolutions(values, float(turns[first]), speed, record.rate)

@@ -11,8 +11,7 @@ from conftest import store_cases
 from scipy.io import wavfile
 
 from compressor.studies.compare import CAPTION, curves, measure_likeness
-from compressor.studies.frame import by_revolutions
-from compressor.vibration import Record, read_record, record_columns
+from compressor.vibration import Record, by_revolutions, read_record, record_columns
 
 HEARD = {"length_rev": 10, "noise_m_per_s2": 0.05}
 CASE = {

@@ -1,8 +1,9 @@
-"""Pulse times: a steady machine loses the steps of its samples; a true change of speed stays."""
+"""Pulses: a steady machine loses the steps of its samples, a true change stays; windows."""
 
 import numpy as np
 import pytest
 
+from compressor.vibration import Record, cut_windows
 from compressor.vibration.tacho import smooth_pulses
 
 RATE, TURN, TRIALS = 25600.0, 0.081, 8
@@ -58,3 +59,20 @@ def test_a_straight_line_and_well_known_pulses_stay():
     uneven = np.array([0.0, 0.08, 0.161, 0.24, 0.322])
     found = smooth_pulses(uneven, np.array([1e-8, 1e-8, HALF, 1e-8, 1e-8]))
     assert np.abs(found - uneven)[[0, 1, 3, 4]].max() <= 1e-8
+
+
+def test_windows_reach_from_pulse_to_pulse():
+    times = np.arange(1000) / 100.0
+    tacho = 0.103 + 0.77 * np.arange(12)
+    record = Record(times, np.sin(times), tacho, 0.0)
+    found = [*cut_windows(record, 3)]
+    assert [first for first, _ in found] == [0, 3, 6]
+    for first, one in found:
+        assert len(one.tacho) == 4
+        assert 0.0 <= one.tacho[0] < 0.01
+        assert 0.0 <= one.times[-1] - one.tacho[-1] < 0.01
+        since = tacho[first] - one.tacho[0]
+        assert one.times[0] == 0.0
+        assert one.values == pytest.approx(np.sin(one.times + since), abs=1e-12)
+    assert [*cut_windows(record, 12)] == []
+    assert len([*cut_windows(record, 11)]) == 1

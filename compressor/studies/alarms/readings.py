@@ -6,8 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compressor.studies import frame
-from compressor.vibration import Record, band_signal, check_record, measure_record, noisy, turns_at
+from compressor.vibration import (
+    USABLE,
+    Record,
+    band_signal,
+    check_record,
+    cut_windows,
+    measure_record,
+    noisy,
+    turns_at,
+)
 
 RECORD = "record"  # the filter's name of a record as it is
 FRAME_HZ = (2.0, 1000.0)  # ours: the band in which frames are judged by body_velocity_rms
@@ -90,7 +98,7 @@ def default_bands(rate: float, passes: float) -> tuple[Band, ...]:
     record holds above the frame's band, equally in its logarithm.
     """
     low, edge = FRAME_HZ
-    top = min(rate / frame.USABLE, passes)
+    top = min(rate / USABLE, passes)
     if top <= 2.0 * edge:
         return ((low, min(edge, top)),)
     middle = float(f"{math.sqrt(edge * top):.2g}")
@@ -108,13 +116,13 @@ def read_windows(
     `check_record`.
     """
     whole = check_record(record.times, record.values, record.tacho)
-    ((_, record),) = frame.cut_windows(record, whole)
+    ((_, record),) = cut_windows(record, whole)
     values, rate = noisy(record.values, noise, seed), record.rate
     signals = {RECORD: values}
     signals |= {f"{low:g}-{high:g} Hz": band_signal(values, rate, low, high) for low, high in bands}
     found = {}
     for name, signal in signals.items():
-        windows = frame.cut_windows(replace(record, values=signal), revolutions)
+        windows = cut_windows(replace(record, values=signal), revolutions)
         if rows := [
             read_window(one.values, turns_at(one.times, one.tacho), revolutions)
             for _, one in windows
@@ -122,7 +130,7 @@ def read_windows(
             found[name] = {key: np.array([row[key] for row in rows]) for key in rows[0]}
     if found:
         speed = band_velocity(values, rate, *velocity_band)
-        windows = frame.cut_windows(replace(record, values=speed), revolutions)
+        windows = cut_windows(replace(record, values=speed), revolutions)
         found[RECORD]["velocity"] = np.array(
             [[np.sqrt(np.mean(one.values**2))] for _, one in windows]
         )

@@ -19,7 +19,7 @@ from compressor.program import Progress, no_progress
 from compressor.store import Folder, find_study
 from compressor.studies import frame
 from compressor.studies.diagnosis.features import FEATURES, features
-from compressor.vibration import RecordError
+from compressor.vibration import RecordError, cut_windows
 
 # groups of a case that are no part of a machine
 NOT_BUILT = (
@@ -94,7 +94,7 @@ def make_data_set(
                     "signal": window.values.astype(np.float32), "rate": window.rate,
                     "tacho": window.tacho.copy(),
                 }
-                for first, window in frame.cut_windows(job.record, revolutions)
+                for first, window in cut_windows(job.record, revolutions)
             ]  # fmt: skip
         except RecordError:
             left["silent_record"] += 1

@@ -11,10 +11,11 @@ import math
 import numpy as np
 
 from compressor.analysis import ORDER
-from compressor.studies import frame
 from compressor.vibration import (
     Record,
     RecordError,
+    by_revolutions,
+    cut_windows,
     energy_angle,
     envelope_spectrum,
     high_pass_orders,
@@ -54,9 +55,9 @@ def features(record: Record) -> dict[str, float]:
     that do not increase or lie beyond the samples, and values that are not all numbers, or all
     zero.
     """
-    turned = frame.by_revolutions(record, SECTORS)
+    turned = by_revolutions(record, SECTORS)
     even, a_turn, speed = turned.values.ravel(), turned.values.shape[1], turned.speed
-    ((_, whole),) = frame.cut_windows(record, len(turned.values))
+    ((_, whole),) = cut_windows(record, len(turned.values))
     if not np.any(whole.values):
         raise RecordError("the record's values are all zero: they hold no signal")
     size, *shapes = shape(even)

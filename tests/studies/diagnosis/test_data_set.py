@@ -15,30 +15,13 @@ from compressor.studies.diagnosis.dataset import (
     split_by_machine,
 )
 from compressor.studies.diagnosis.features import features
-from compressor.studies.frame import StudyError, cut_windows
+from compressor.studies.frame import StudyError
 from compressor.vibration import Record
 
 
 @pytest.fixture(scope="module")
 def made(worn):
     return make_data_set(worn, "worn")
-
-
-def test_windows_reach_from_pulse_to_pulse():
-    times = np.arange(1000) / 100.0
-    tacho = 0.103 + 0.77 * np.arange(12)
-    record = Record(times, np.sin(times), tacho, 0.0)
-    found = [*cut_windows(record, 3)]
-    assert [first for first, _ in found] == [0, 3, 6]
-    for first, one in found:
-        assert len(one.tacho) == 4
-        assert 0.0 <= one.tacho[0] < 0.01
-        assert 0.0 <= one.times[-1] - one.tacho[-1] < 0.01
-        since = tacho[first] - one.tacho[0]
-        assert one.times[0] == 0.0
-        assert one.values == pytest.approx(np.sin(one.times + since), abs=1e-12)
-    assert [*cut_windows(record, 12)] == []
-    assert len([*cut_windows(record, 11)]) == 1
 
 
 def test_every_job_that_can_gives_windows(made):
