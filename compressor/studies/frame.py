@@ -35,7 +35,7 @@ from compressor.store import (
     read_store,
     write_dataset,
 )
-from compressor.sweep import End, Options, in_this_process, needed_parts, run_here, sweep
+from compressor.sweep import Options, in_this_process, needed_parts, run_here, sweep
 from compressor.vibration import Record
 
 RANGE = re.compile(r"\s*([\w.]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*(?::\s*(\d+)\s*)?")
@@ -317,11 +317,12 @@ def run_rows(
     workers: int,
     progress: Progress,
     rerun: bool = False,
-) -> tuple[int, dict[str, End]]:
+) -> tuple[int, dict[str, tuple[str, str]]]:
     """Make what is missing of files, side by side; return what was done before, and what was lost.
 
-    Those that were lost by their keys. Progress counts as `count_done`. Whatever ends it early,
-    what was stored stays, and the same call goes on. Raises StoreError and WorkersFailed.
+    Of those that were lost reason and detail, by their keys. Progress counts as `count_done`.
+    Whatever ends it early, what was stored stays, and the same call goes on. Raises StoreError and
+    WorkersFailed.
     """
     place = Path(folder).absolute()
     whole = {growing.key: growing for growing in every}
@@ -342,7 +343,7 @@ def run_rows(
     parts = needed_parts(case for one in missing for case in one.cases)
     running = run_here(partial(make_rows, folder=place, rerun=rerun), jobs, parts, workers, look)
     with contextlib.closing(running), calling_often(look):
-        lost = {end.id: end for end in running if end.reason}
+        lost = {end.id: (str(end.reason), end.detail) for end in running if end.reason}
     look()
     return before, lost
 

@@ -24,7 +24,6 @@ from compressor.report import PlotlyFigure, make_grid, style
 from compressor.solve import simulate
 from compressor.store import Folder, StoreError, writable_folder
 from compressor.studies import frame
-from compressor.sweep import End
 
 FOLDER = "wear"
 SCHEMA = 2  # of a stage's numbers: a change of what they mean makes them again
@@ -281,15 +280,14 @@ def run_wear(
 
 
 def worn_machine(
-    study: str, point: dict[str, Any], worn: Worn, folder: Folder, end: End | None
+    study: str, point: dict[str, Any], worn: Worn, folder: Folder, lost: tuple[str, str] | None
 ) -> WornMachine:
-    """Return a machine of a study by its stored stages; end: how its worker was lost, if it was."""
+    """Return a machine of a study by its stored stages; lost: why its worker was, if it was."""
     kept = frame.stored_rows(worn, folder)
     if not kept:
-        why = (str(end.reason), end.detail) if end else ("", "")
-        return WornMachine(study, point, worn, None, None, *why)
+        return WornMachine(study, point, worn, None, None, *(lost or ("", "")))
     stages, last = worn.to_dataset(kept), kept[-1]
-    why = (str(end.reason), end.detail) if end else (last["reason"], last["detail"])
+    why = lost or (last["reason"], last["detail"])
     return WornMachine(study, point, worn, stages, life(worn, stages), *why)
 
 

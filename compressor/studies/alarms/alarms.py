@@ -14,9 +14,9 @@ then is the greatest score, and the rate 1 / (n + 1).
 
 import json
 import math
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from statistics import NormalDist
 from typing import Any
@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import faulty_joints, interpolate_hours
-from compressor.cases import Case, Sensor, Wear
+from compressor.analysis import interpolate_hours
+from compressor.cases import Case, Wear
 from compressor.metrics import JOINTS
 from compressor.program import Progress, no_progress
 from compressor.report import PlotlyFigure, make_grid, style
@@ -38,102 +38,18 @@ from compressor.studies.alarms.readings import (
     Alarm,
     Band,
     Readings,
-    default_bands,
-    read_windows,
+    Windows,
+    read_study,
 )
-from compressor.vibration import RecordError
 
 SOUND = "none"  # the joint that is worn in a sound machine
 MIN_SOUND = 10  # draws of a sound machine: by fewer of them no limit means anything
-NO_DRAW = ("joint", "clearance_mm", "sensor", "healthy_clearance_mm")  # groups that make no draw
 DETECTED = 0.9  # share of windows from which on an alarm is said to detect
 FOLDS, SEED = 5, 1
 MAX_LEVELS, BINS = 12, 6  # clearances of a joint, beyond which they are put together in groups
 Z = NormalDist().inv_cdf(0.975)  # of intervals of 95 %
 ENDS = ("value", "low", "high")  # of a number and its interval
 WEAR_REMEDY = "compsim wear the machine's case file, and name the file, or its folder of results"
-
-
-@dataclass(frozen=True)
-class Windows:
-    """The n windows of a study's jobs.
-
-    joints: worn ones, (n,); clearances: of the worn joint, of both the greater one, mm, (n,);
-    draws, keys: (n,); readings: by noise level and filter; clipped: jobs with clipped records.
-    """
-
-    joints: np.ndarray
-    clearances: np.ndarray
-    draws: np.ndarray
-    keys: np.ndarray
-    readings: dict[tuple[int, str], Readings]
-    clipped: int
-
-
-def read_study(
-    folder: Folder, source: StoredStudy, bands: Sequence[Band], noise: Sequence[float],
-    revolutions: int, left: Counter[str], progress: Progress,
-) -> Windows:  # fmt: skip
-    """Return the windows of all jobs of a study that have a record. Raises StudyError.
-
-    bands: Hz, none for `default_bands`; left: counts the other jobs by reason.
-    """
-    rows: list[tuple[str, float, str, str]] = []
-    readings: dict[tuple[int, str], list[Readings]] = defaultdict(list)
-    clipped = 0
-    for job in frame.records(folder, source, left, progress):
-        case, record = job.case, job.record
-        assert case.body  # which made the record
-        assert case.sensor
-        passes = min(case.sensor.low_pass_Hz or math.inf, case.sensor.mounting_Hz)
-        bands = bands or default_bands(record.rate, passes)
-        check_bands(bands, job.key, record.rate, passes)
-        if len(record.tacho) - 1 < revolutions or not np.ptp(record.values):
-            left["too_short" if np.ptp(record.values) else "silent_record"] += 1
-            continue
-        low, high = case.body.band_Hz
-        in_band = low, min(high, record.rate / 2.0)
-        own: dict[tuple[int, str], Readings] = {}
-        try:
-            for level, rms in enumerate(noise):
-                seed = [SEED, int(job.key, 16), level]
-                read = read_windows(record, revolutions, bands, in_band, rms, seed)
-                own |= {(level, name): one for name, one in read.items()}
-        except RecordError:
-            left["silent_record"] += 1
-            continue
-        count = len(own[0, RECORD]["sensor_rms"])
-        velocity = np.asarray(job.outcome.numbers["body_velocity_rms"], float)
-        for place, one in own.items():
-            if place[1] == RECORD:
-                one["body_velocity_rms"] = np.tile(velocity, (count, 1))
-            readings[place].append(one)
-        joint = case.worn_joint
-        sides = faulty_joints(joint)
-        clearance = max(getattr(case.clearance_mm, side, math.nan) for side in sides)
-        varied = {k: one for k, one in job.point.items() if k.partition(".")[0] not in NO_DRAW}
-        rows += [(joint, clearance, json.dumps(varied, sort_keys=True), job.key)] * count
-        clipped += float(job.outcome.numbers["clipped_fraction"]) >= Sensor.REPORTED
-    if not rows:
-        raise frame.no_records(source, left, revolutions)
-    stacked = {
-        place: {name: np.concatenate([one[name] for one in some]) for name in some[0]}
-        for place, some in readings.items()
-    }
-    joints, clearances, draws, keys = map(np.array, zip(*rows, strict=True))
-    return Windows(joints, clearances, draws, keys, stacked, clipped)
-
-
-def check_bands(bands: Sequence[Band], key: str, rate: float, passes: float) -> None:
-    """Raise StudyError unless a job's record holds the bands; passes: as `default_bands` has it."""
-    top = min(rate / 2.0, passes)
-    for low, high in bands:
-        if high > top * (1.0 + 1e-9):
-            raise frame.StudyError(
-                f"band {low:g}-{high:g} Hz: job {key} is sampled at {rate:.6g} Hz, and its sensor "
-                f"passes up to {passes:g} Hz (sensor.low_pass_Hz, or the resonance "
-                f"sensor.mounting_Hz): give bands up to {top:g} Hz"
-            )
 
 
 def check_draws(source: StoredStudy, windows: Windows) -> None:
@@ -246,7 +162,7 @@ RATES = {  # name -> dims beside alarm and noise, unit, long name
 
 def judge_windows(windows: Windows, noise: Sequence[float], false_alarms: float) -> xr.Dataset:
     """Return the `RATES` of all alarms whose reading all sound windows have."""
-    sound, draws, readings = windows.joints == SOUND, windows.draws, windows.readings
+    sound, draws = windows.joints == SOUND, windows.draws
     states = [*list_states(windows)]
     joint_of = np.array([joint for joint, _ in states])
     sizes = [windows.clearances[rows] for _, rows in states]
@@ -271,12 +187,12 @@ def judge_windows(windows: Windows, noise: Sequence[float], false_alarms: float)
         return dict(zip(RATES, (limit, rates, false, first), strict=True))
 
     def is_judged(alarm: Alarm, name: str) -> bool:
-        usual = readings[0, name].get(alarm.reading, np.full(sound.shape, math.nan))[sound]
+        usual = windows.readings[0, name].get(alarm.reading, np.full(sound.shape, math.nan))[sound]
         return bool(np.isfinite(usual).all()) and (name == RECORD or alarm.is_filtered)
 
-    filters = [*dict.fromkeys(name for _, name in readings)]
+    filters = [*dict.fromkeys(name for _, name in windows.readings)]
     listed = [(alarm, name) for alarm in ALARMS for name in filters if is_judged(alarm, name)]
-    judged = [[judge(alarm, readings[level, name]) for level in range(len(noise))]
+    judged = [[judge(alarm, windows.readings[level, name]) for level in range(len(noise))]
               for alarm, name in listed]  # fmt: skip
     found = {
         rate: (("alarm", "noise", *dims), np.array([[one[rate] for one in row] for row in judged]),

@@ -1,14 +1,22 @@
-"""What alarms read of a sensor's record: levels, counts and velocity of windows, by filter."""
+"""What alarms read of the windows of a study's records: levels, counts, velocity, by filter."""
 
+import json
 import math
+from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from compressor.analysis import faulty_joints
+from compressor.cases import Sensor
+from compressor.program import Progress
+from compressor.store import Folder, StoredStudy
+from compressor.studies import frame
 from compressor.vibration import (
     USABLE,
     Record,
+    RecordError,
     band_signal,
     check_record,
     cut_windows,
@@ -23,6 +31,8 @@ FRAME_HZ = (2.0, 1000.0)  # ours: the band in which frames are judged by body_ve
 LADDER = np.geomspace(1e-2, 1e4, 121)
 COUNTED = (0.5, 1.0)  # ours: times the sound machine's peak, over which peaks are counted
 BODY_VELOCITY = "velocity of the body"  # reads a stored metric: no noise disturbs it
+NO_DRAW = ("joint", "clearance_mm", "sensor", "healthy_clearance_mm")  # groups that make no draw
+SEED = 1  # of the noise, beside the job's key
 LEAST_COUNT = 1.0  # a revolution: fewer of a sound machine count as so many
 
 Band = tuple[float, float]
@@ -156,3 +166,85 @@ def band_velocity(values: np.ndarray, rate: float, low: float, high: float) -> n
     omega = 2.0j * np.pi * np.fft.rfftfreq(len(values), 1.0 / rate)
     omega[0], lines[0] = 1.0, 0.0
     return np.fft.irfft(lines / omega, len(values))
+
+
+@dataclass(frozen=True)
+class Windows:
+    """The n windows of a study's jobs.
+
+    joints: worn ones, (n,); clearances: of the worn joint, of both the greater one, mm, (n,);
+    draws, keys: (n,); readings: by noise level and filter; clipped: jobs with clipped records.
+    """
+
+    joints: np.ndarray
+    clearances: np.ndarray
+    draws: np.ndarray
+    keys: np.ndarray
+    readings: dict[tuple[int, str], Readings]
+    clipped: int
+
+
+def read_study(
+    folder: Folder, source: StoredStudy, bands: Sequence[Band], noise: Sequence[float],
+    revolutions: int, left: Counter[str], progress: Progress,
+) -> Windows:  # fmt: skip
+    """Return the windows of all jobs of a study that have a record. Raises StudyError.
+
+    bands: Hz, none for `default_bands`; left: counts the other jobs by reason.
+    """
+    rows: list[tuple[str, float, str, str]] = []
+    readings: dict[tuple[int, str], list[Readings]] = defaultdict(list)
+    clipped = 0
+    for job in frame.records(folder, source, left, progress):
+        case, record = job.case, job.record
+        assert case.body  # which made the record
+        assert case.sensor
+        passes = min(case.sensor.low_pass_Hz or math.inf, case.sensor.mounting_Hz)
+        bands = bands or default_bands(record.rate, passes)
+        check_bands(bands, job.key, record.rate, passes)
+        if len(record.tacho) - 1 < revolutions or not np.ptp(record.values):
+            left["too_short" if np.ptp(record.values) else "silent_record"] += 1
+            continue
+        low, high = case.body.band_Hz
+        in_band = low, min(high, record.rate / 2.0)
+        own: dict[tuple[int, str], Readings] = {}
+        try:
+            for level, rms in enumerate(noise):
+                seed = [SEED, int(job.key, 16), level]
+                read = read_windows(record, revolutions, bands, in_band, rms, seed)
+                own |= {(level, name): one for name, one in read.items()}
+        except RecordError:
+            left["silent_record"] += 1
+            continue
+        count = len(own[0, RECORD]["sensor_rms"])
+        velocity = np.asarray(job.outcome.numbers["body_velocity_rms"], float)
+        for place, one in own.items():
+            if place[1] == RECORD:
+                one["body_velocity_rms"] = np.tile(velocity, (count, 1))
+            readings[place].append(one)
+        joint = case.worn_joint
+        sides = faulty_joints(joint)
+        clearance = max(getattr(case.clearance_mm, side, math.nan) for side in sides)
+        varied = {k: one for k, one in job.point.items() if k.partition(".")[0] not in NO_DRAW}
+        rows += [(joint, clearance, json.dumps(varied, sort_keys=True), job.key)] * count
+        clipped += float(job.outcome.numbers["clipped_fraction"]) >= Sensor.REPORTED
+    if not rows:
+        raise frame.no_records(source, left, revolutions)
+    stacked = {
+        place: {name: np.concatenate([one[name] for one in some]) for name in some[0]}
+        for place, some in readings.items()
+    }
+    joints, clearances, draws, keys = map(np.array, zip(*rows, strict=True))
+    return Windows(joints, clearances, draws, keys, stacked, clipped)
+
+
+def check_bands(bands: Sequence[Band], key: str, rate: float, passes: float) -> None:
+    """Raise StudyError unless a job's record holds the bands; passes: as `default_bands` has it."""
+    top = min(rate / 2.0, passes)
+    for low, high in bands:
+        if high > top * (1.0 + 1e-9):
+            raise frame.StudyError(
+                f"band {low:g}-{high:g} Hz: job {key} is sampled at {rate:.6g} Hz, and its sensor "
+                f"passes up to {passes:g} Hz (sensor.low_pass_Hz, or the resonance "
+                f"sensor.mounting_Hz): give bands up to {top:g} Hz"
+            )

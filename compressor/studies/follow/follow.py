@@ -25,7 +25,6 @@ from compressor.program import Progress
 from compressor.store import Folder, coordinate_names, swept_column, writable_folder, write_dataset
 from compressor.studies import frame
 from compressor.studies.follow import motion
-from compressor.sweep import End
 
 FOLDER = "follow"
 SCHEMA = 4  # of a row's numbers: a change of what they mean makes chains again
@@ -207,13 +206,13 @@ def follow(
     return Followed(sum(chain.size for chain in chains), before, data, path)
 
 
-def rows_to_show(chain: Chain, folder: Folder, end: End | None) -> list[frame.Row]:
-    """Return the rows of a chain, at least one; end: how it was lost, at the value after them."""
+def rows_to_show(chain: Chain, folder: Folder, lost: tuple[str, str] | None) -> list[frame.Row]:
+    """Return the rows of a chain, at least one; lost: why it was, at the value after them."""
     rows = frame.stored_rows(chain, folder)
     blank = motion.empty_row(chain.cases[0], chain.points) | {"status": "missing"}
-    if end and len(rows) < len(chain.cases):
-        failed = {"status": "failed", "reason": str(end.reason), "detail": end.detail}
-        return [*rows, blank | failed]
+    if lost and len(rows) < len(chain.cases):
+        reason, detail = lost
+        return [*rows, blank | {"status": "failed", "reason": reason, "detail": detail}]
     return rows or [blank]
 
 

@@ -5,14 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from compressor.studies.alarms.alarms import (
-    Windows,
-    check_draws,
-    judge_windows,
-    list_rows,
-    rank_alarms,
-)
-from compressor.studies.alarms.readings import LADDER, RECORD, band_velocity, read_windows
+from compressor.studies.alarms.alarms import check_draws, judge_windows, list_rows, rank_alarms
+from compressor.studies.alarms.readings import LADDER, RECORD, Windows, band_velocity, read_windows
 from compressor.studies.frame import StudyError
 from compressor.vibration import Record
 
