@@ -45,6 +45,7 @@ LIBRARIES = {  # library -> the modules that may import it
     for libraries, places in read_table("library")
     for library in quoted(libraries)
 }
+MAX_NAMES = 10  # of ours that a study imports
 OF_PHYSICS = {
     "numpy", "math", "enum", "typing", "types", "dataclasses", "collections", "functools",
     "compressor",
@@ -111,8 +112,8 @@ def faults(module, text):
         if top not in ("compressor", "compsim"):
             continue
         handed_on = name in {one for _, one in imports(SOURCES.get(source, ""))}
-        if inner in SOURCES and not handed_on:  # a module by its name
-            source, name = inner, ""
+        if inner in SOURCES and not handed_on:  # a package or a module by its name
+            source = inner
         there = room(source)
         if there not in {"program", here, *MAY_IMPORT[here]}:
             yield f"{module} imports {source}"
@@ -121,6 +122,13 @@ def faults(module, text):
             yield f"{module} imports {source} past its door"
         if study(source) not in {"", study(module)} and here != "compsim":
             yield f"{module} imports the study {source}"
+    packages = {name for source, name in imports(text) if source == "compressor"} & {*PACKAGES}
+    doors = {name: {one for _, one in imports(SOURCES[f"compressor.{name}"])} for name in packages}
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            package = node.value.id
+            if node.attr not in doors.get(package, {node.attr}):
+                yield f"{module} takes {package}.{node.attr}, which its door does not have"
 
 
 def circles(sources):
@@ -149,6 +157,8 @@ def test_the_house_keeps_its_rules():
         ("compressor.cases.study", "def late():\n    import compressor.store"),
         ("compressor.sweep.sweep", "from compressor.store import netcdf"),
         ("compressor.sweep.sweep", "from compressor.store.netcdf import write_dataset"),
+        ("compressor.sweep.sweep", "import compressor.store"),
+        ("compressor.sweep.sweep", "from compressor import store\nstore.netcdf"),
         ("compressor.physics.kinematics", "import compressor.physics.motion"),
         ("compressor.solve.simulate", "import h5py"),
         ("compressor.report.report", "import compressor.studies.wear"),
@@ -158,6 +168,14 @@ def test_the_house_keeps_its_rules():
 def test_a_planted_fault_breaks_a_rule(module, planted):
     text = f"{SOURCES[module]}\n{planted}\n"
     assert [*faults(module, text)] or circles(SOURCES | {module: text})
+
+
+def test_a_study_imports_few_names():
+    own = {
+        module: {name or source for source, name in imports(text) if source.startswith("comp")}
+        for module, text in SOURCES.items() if room(module) == "studies"
+    }  # fmt: skip
+    assert {module: names for module, names in own.items() if len(names) > MAX_NAMES} == {}
 
 
 def test_every_package_is_installed():

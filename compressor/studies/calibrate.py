@@ -21,11 +21,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from compressor.cases import Case, design, load_studies
+from compressor import cases, store, vibration
+from compressor.cases import Case
 from compressor.program import Progress, no_progress
-from compressor.store import Folder, job_record, read_store
 from compressor.studies import frame
-from compressor.vibration import USABLE, Record, by_revolutions
 
 # ---- a record's orders
 
@@ -46,12 +45,12 @@ class Orders:
     speed: float
 
 
-def orders_of(record: Record) -> Orders:
+def orders_of(record: vibration.Record) -> Orders:
     """Return the orders of a record up to what its sampling rate holds.
 
     Raises RecordError as `vibration.check_record`.
     """
-    turned = by_revolutions(record)
+    turned = vibration.by_revolutions(record)
     lines, speed = math.sqrt(2.0) * turned.lines(turned.highest), turned.speed
     count, highest = lines.shape
     scatter = lines.var(axis=0, ddof=1) if count > 1 else np.zeros(highest)
@@ -256,7 +255,7 @@ class FitJobs:
 
     def __init__(
         self, path: str, unknowns: Sequence[frame.KeySpan], overrides: Sequence[str],
-        folder: Folder, workers: int, progress: Progress,
+        folder: store.Folder, workers: int, progress: Progress,
     ):  # fmt: skip
         self.unknowns, self.folder, self.plain = tuple(unknowns), folder, [*overrides]
         keys = [one.key for one in unknowns]
@@ -285,7 +284,7 @@ class FitJobs:
         pairs = zip(self.unknowns, self.point(shares), strict=True)
         fitted = (f"{one.key}={value!r}" for one, value in pairs)
         texts = frame.replace_settings(self.plain, *fitted)
-        (found,) = load_studies(self.study.path, overrides=texts)
+        (found,) = cases.load_studies(self.study.path, overrides=texts)
         if found.jobs != 1:
             axes = ", ".join(axis.key for axis in found.axes)
             raise frame.StudyError(
@@ -300,10 +299,10 @@ class FitJobs:
         shares: (k,), or (n, k) for n machines side by side.
         """
         keys = self.study.run([self.point(row) for row in np.atleast_2d(shares)])
-        store = read_store(self.folder)
+        stored = store.read_store(self.folder)
         found = []
         for key in keys:
-            record = job_record(store, key)
+            record = store.job_record(stored, key)
             if record is None:
                 found.append(np.full(self.highest, np.nan + 0j))
             else:
@@ -312,7 +311,7 @@ class FitJobs:
 
 
 def calibrate(
-    record: Record, path: str, unknowns: Sequence[frame.KeySpan], folder: Folder,
+    record: vibration.Record, path: str, unknowns: Sequence[frame.KeySpan], folder: store.Folder,
     overrides: Sequence[str] = (), workers: int = 2, progress: Progress = no_progress,
 ) -> Calibration:  # fmt: skip
     """Return what a record of a sound machine says of a case's unknown keys.
@@ -331,13 +330,13 @@ def calibrate(
     jobs.run_at(60.0 * measured.speed)
     sensor = jobs.middle.sensor
     assert sensor is not None
-    corner = min(sensor.low_pass_Hz or math.inf, sensor.rate_Hz / USABLE)
+    corner = min(sensor.low_pass_Hz or math.inf, sensor.rate_Hz / vibration.USABLE)
     # the highest order that both hold; a job's own count may be one less by rounding
     jobs.highest = min(len(measured.amplitudes), int(corner / measured.speed * (1.0 - 1e-9)))
     if not jobs.highest:
         what = f"its sensor's band holds no order of {60 * measured.speed:.6g} rpm"
         raise frame.StudyError(f"{path}: {what}: raise sensor.low_pass_Hz")
-    starts = np.array(design("lhs", POINTS_A_KEY * len(unknowns), len(unknowns), SEED))
+    starts = np.array(cases.design("lhs", POINTS_A_KEY * len(unknowns), len(unknowns), SEED))
     amplitudes, errors = measured.amplitudes[: jobs.highest], measured.errors[: jobs.highest]
     fit = fit_orders(jobs, amplitudes, errors, starts)
     study = jobs.study

@@ -12,37 +12,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import (
-    LOADS,
-    RULES,
-    NoSeriesError,
-    claim_margins,
-    label,
-    paper_cases,
-    saltelli_design,
-)
-from compressor.cases import Case, points
-from compressor.program import Progress, no_progress, report_progress
-from compressor.report import PlotlyFigure, contour_lines, make_grid, style
-from compressor.store import (
-    DamagedFile,
-    Folder,
-    StoredStudy,
-    coordinate_names,
-    read_store,
-    swept_column,
-)
+from compressor import analysis, cases, program, report, store, vibration
+from compressor.cases import Case
+from compressor.report import style
+from compressor.store import StoredStudy
 from compressor.studies import frame
-from compressor.vibration import RecordError
 
-CLAIMS = tuple(range(1, len(RULES) + 1))
+CLAIMS = tuple(range(1, len(analysis.RULES) + 1))
 SHORT = (
     "same ideal motion", "spring load differs", "acceleration alone changes",
     "peaks grow with clearance", "horizontal force dominates", "acceleration follows force",
     "big end hits steadily", "two clearances are worse",
 )  # fmt: skip
 ROLES = ("load", "joint", "clearance_mm")  # keys that make the paper's cases of a machine
-LABELS = tuple(paper_cases())
+LABELS = tuple(analysis.paper_cases())
 ROD, RECIPROCATING = "rod_mass_kg", "reciprocating_mass_kg"
 CUT = 1.0  # margins beyond this are cut: how far beyond decides no claim
 ORDERS = ("first_order", "total_order")
@@ -63,13 +46,13 @@ def machines(source: StoredStudy) -> dict[Key, dict[str, str]]:
 
     Jobs that are none of these are left aside. Raises StudyError without a machine that has all.
     """
-    ideal = {load: name for name, load in LOADS.items()}
+    ideal = {load: name for name, load in analysis.LOADS.items()}
     found: dict[Key, dict[str, str]] = {}
-    for key, point in zip(source.keys, points(source), strict=True):
+    for key, point in zip(source.keys, cases.points(source), strict=True):
         load, joint, clearance = (point.get(role) for role in ROLES)
         name = ideal.get(str(load), "") if joint == "none" else ""
-        if load == LOADS["design"] and isinstance(clearance, float):
-            name = label(str(joint), clearance)
+        if load == analysis.LOADS["design"] and isinstance(clearance, float):
+            name = analysis.label(str(joint), clearance)
         machine = tuple(one for one in point.items() if one[0] not in ROLES)
         if name in LABELS:
             found.setdefault(machine, {})[name] = key
@@ -81,7 +64,7 @@ def machines(source: StoredStudy) -> dict[Key, dict[str, str]]:
 
 
 def judge_machines(
-    folder: Folder, source: StoredStudy, progress: Progress = no_progress
+    folder: store.Folder, source: StoredStudy, progress: program.Progress = program.no_progress
 ) -> xr.Dataset:
     """Return the margins of each machine of a stored study, with the dimension machine.
 
@@ -89,9 +72,9 @@ def judge_machines(
     StudyError and StoreError.
     """
     found = machines(source)
-    stored = read_store(folder, warn=True)
+    stored = store.read_store(folder, warn=True)
     rows = []
-    for jobs in report_progress([*found.values()], progress):
+    for jobs in program.report_progress([*found.values()], progress):
         runs, problems = {}, [f"{name}: missing" for name in LABELS if name not in jobs]
         for name, key in jobs.items():
             status = stored.status(key)
@@ -103,17 +86,19 @@ def judge_machines(
                 continue
             try:
                 runs[name] = stored.job(key)
-            except DamagedFile:
+            except store.DamagedFile:
                 problems.append(f"{name}: damaged")
         rows.append(measure(runs, "; ".join(problems)))
     columns = zip(*(dict(machine).values() for machine in found), strict=True)
-    names = coordinate_names([key for key, _ in next(iter(found))])
+    names = store.coordinate_names([key for key, _ in next(iter(found))])
     coords: dict[str, tuple] = {
-        name: ("machine", *swept_column(key, column))
+        name: ("machine", *store.swept_column(key, column))
         for (key, name), column in zip(names.items(), columns, strict=True)
     }
     coords["claim"] = "claim", np.array(CLAIMS), {"long_name": "claim of the paper"}
-    thresholds = "; ".join(f"{n}. {rule.threshold}" for n, rule in zip(CLAIMS, RULES, strict=True))
+    thresholds = "; ".join(
+        f"{n}. {rule.threshold}" for n, rule in zip(CLAIMS, analysis.RULES, strict=True)
+    )
     judged = frame.rows_dataset(rows, "machine", TEXTS, NUMBERS).assign_coords(coords)
     return judged.assign_attrs(thresholds=thresholds, study=source.name)
 
@@ -126,8 +111,8 @@ def measure(runs: Mapping[str, xr.Dataset], failed: str = "") -> frame.Row:
     """
     margins = np.full((len(CLAIMS), 2), math.nan)
     try:
-        margins[:] = margins if failed else claim_margins(runs)
-    except (NoSeriesError, RecordError) as error:
+        margins[:] = margins if failed else analysis.claim_margins(runs)
+    except (analysis.NoSeriesError, vibration.RecordError) as error:
         failed = str(error)
     return {
         "margin": margins[:, 0].tolist(), "error": margins[:, 1].tolist(),
@@ -159,7 +144,7 @@ def sensitivity(found: xr.Dataset) -> xr.Dataset | None:
     names = assumptions(found)
     columns = [found[name].values for name in names]
     is_numeric = bool(columns) and all(column.dtype != object for column in columns)
-    design = saltelli_design(np.stack(columns, axis=1)) if is_numeric else None
+    design = analysis.saltelli_design(np.stack(columns, axis=1)) if is_numeric else None
     if design is None:
         return None
     margin = np.clip(found["margin"].transpose("claim", "machine").values, -CUT, CUT)
@@ -237,7 +222,7 @@ MAP = "blue: the claim holds, red: it does not, by its margin; ring: the default
 BARS = "shares of the variance of a claim's margin by an assumption, with 95 % intervals"
 
 
-def draw(found: xr.Dataset, effects: xr.Dataset | None) -> tuple[PlotlyFigure, str] | None:
+def draw(found: xr.Dataset, effects: xr.Dataset | None) -> tuple[report.PlotlyFigure, str] | None:
     """Return the figure of machines and a sentence on it: a map over both masses, or what decides.
 
     None where they are neither kind, or nothing is known of them.
@@ -252,9 +237,9 @@ def draw(found: xr.Dataset, effects: xr.Dataset | None) -> tuple[PlotlyFigure, s
     return draw_sensitivity(effects), BARS
 
 
-def draw_map(plane: xr.Dataset) -> PlotlyFigure:
+def draw_map(plane: xr.Dataset) -> report.PlotlyFigure:
     """Return each claim's margin over rod and reciprocating mass, and how many claims hold."""
-    drawing, panels = make_grid(2, 4, 5.6, len(OF_MASSES) + 1, share_x="all", share_y="all")
+    drawing, panels = report.make_grid(2, 4, 5.6, len(OF_MASSES) + 1, share_x="all", share_y="all")
     x, y = plane[ROD].values, plane[RECIPROCATING].values
     *shown, number = drawing.panels
     for claim, panel in zip(OF_MASSES, shown, strict=True):
@@ -262,7 +247,7 @@ def draw_map(plane: xr.Dataset) -> PlotlyFigure:
         panel.map(x, y, margin, style.palette("RdBu"), (-REACH, REACH), "margin",
                   has_scale=panel is panels[0, 3])  # fmt: skip
         if (margin >= 0.0).any() and (margin < 0.0).any():
-            line = contour_lines(x, y, (margin >= 0.0).astype(float), [0.5])
+            line = report.contour_lines(x, y, (margin >= 0.0).astype(float), [0.5])
             panel.plot(*line, style.LineStyle(style.BLACK, linewidth=1.0))
         panel.title = f"claim {claim}"
     count = (plane["margin"] >= 0.0).transpose("claim", RECIPROCATING, ROD).sum("claim").values
@@ -277,13 +262,13 @@ def draw_map(plane: xr.Dataset) -> PlotlyFigure:
     return drawing.figure()
 
 
-def draw_sensitivity(effects: xr.Dataset) -> PlotlyFigure:
+def draw_sensitivity(effects: xr.Dataset) -> report.PlotlyFigure:
     """Return main and total effect of each assumption on each claim's margin, with intervals."""
     names = [str(name).replace("_", " ") for name in effects["assumption"].values]
     claims = [claim for claim in CLAIMS if effects["total_order"].sel(claim=claim).notnull().any()]
     rows = -(-len(claims) // 4)
     height = 0.8 + rows * (0.9 + 0.21 * len(names))
-    drawing, _ = make_grid(rows, 4, height, len(claims), share_y="all")
+    drawing, _ = report.make_grid(rows, 4, height, len(claims), share_y="all")
     place = np.arange(len(names), dtype=float)
     for panel, claim in zip(drawing.panels, claims, strict=True):
         for variable, color, shift, name in EFFECTS:

@@ -13,14 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from compressor.analysis import ORDER, faulty_joints
-from compressor.cases import Case, points
-from compressor.digits import align_columns, plural
-from compressor.program import Progress, no_progress, report_progress
-from compressor.report import PlotlyFigure, make_grid, style
-from compressor.store import Folder, find_record, job_record, read_store, read_studies, report_job
+from compressor import analysis, cases, digits, program, report, store, vibration
+from compressor.cases import Case
+from compressor.report import style
 from compressor.studies import frame
-from compressor.vibration import RecordError, Revolutions, by_revolutions, segment_levels
 
 SEGMENTS = 36
 FINE = 4  # points on a curve for each cycle of its highest order
@@ -75,10 +71,10 @@ def curves(lines: np.ndarray) -> Curves:
     whole = np.zeros((len(lines), size), complex)  # of the analytic signal
     whole[:, 1 : orders + 1] = lines * (math.sqrt(2.0) * size)
     each = np.fft.ifft(whole, axis=1).real
-    whole[:, : ORDER + 1] = 0.0
+    whole[:, : analysis.ORDER + 1] = 0.0
     envelopes = np.abs(np.fft.ifft(whole, axis=1)).reshape(len(lines), 360, -1).mean(axis=2)
     angle = np.arange(size) * (360.0 / size)
-    levels = np.array([segment_levels(angle, turn, SEGMENTS) for turn in each])
+    levels = np.array([vibration.segment_levels(angle, turn, SEGMENTS) for turn in each])
     peak, rms = levels.mean(axis=0)
     spectrum = np.sqrt(np.mean(np.abs(lines) ** 2, axis=0))
     return Curves(angle, each.mean(axis=0), peak, rms, spectrum, envelopes)
@@ -241,7 +237,7 @@ class Comparison:
 
     name: str
     remarks: tuple[str, ...]
-    turned: Revolutions
+    turned: vibration.Revolutions
     curves: Curves
     orders: int
     jobs: tuple[Compared, ...]
@@ -251,9 +247,9 @@ class Comparison:
 def compare_record(
     name: str,
     words: Sequence[str],
-    folder: Folder,
+    folder: store.Folder,
     hints: Mapping[str, Any],
-    progress: Progress = no_progress,
+    progress: program.Progress = program.no_progress,
 ) -> Comparison:
     """Return a record, a file or a stored job's, beside the jobs that words name.
 
@@ -261,19 +257,19 @@ def compare_record(
     hints: of `find_record`. Raises RecordError, StoreError, and StudyError where no job is left
     or orders are too few.
     """
-    key, record = find_record(name, folder, hints)
-    mine = by_revolutions(record)
+    key, record = store.find_record(name, folder, hints)
+    mine = vibration.by_revolutions(record)
     check_orders(mine.highest, name)
     own = {mine.highest: curves(mine.lines(mine.highest))}  # by the highest order
-    stored = read_store(folder, warn=True)
+    stored = store.read_store(folder, warn=True)
     wanted = dict(wanted_jobs(words, folder, key))
     jobs = []
-    for one, swept in report_progress([*wanted.items()], progress):
-        other, case = job_record(stored, one), stored.case_at(int(stored.find([one])[0]))
+    for one, swept in program.report_progress([*wanted.items()], progress):
+        other, case = store.job_record(stored, one), stored.case_at(int(stored.find([one])[0]))
         if other is None or case is None or not case.sensor:
             continue
-        with contextlib.suppress(RecordError):  # too short, or all zero
-            theirs = by_revolutions(other)
+        with contextlib.suppress(vibration.RecordError):  # too short, or all zero
+            theirs = vibration.by_revolutions(other)
             orders = min(mine.highest, theirs.highest)
             check_orders(orders, f"job {one}")
             lines, others = mine.lines(orders), theirs.lines(orders)
@@ -298,50 +294,52 @@ def compare_record(
 
 def check_orders(orders: int, what: str) -> None:
     """Raise StudyError where a sampling rate holds too few orders."""
-    if orders <= ORDER:
+    if orders <= analysis.ORDER:
         text = f"{what}: the sampling rate holds the orders up to {orders} alone"
         raise frame.StudyError(
-            f"{text}: record with more than {ORDER + 1} times 2.56 samples a turn"
+            f"{text}: record with more than {analysis.ORDER + 1} times 2.56 samples a turn"
         )
 
 
 def describe_job(case: Case, swept: Mapping[str, Any]) -> str:
     """Return a job's joint and clearance, and other values that its study sweeps, in words."""
-    ends = () if case.joint == "none" else faulty_joints(case.joint)
+    ends = () if case.joint == "none" else analysis.faulty_joints(case.joint)
     words = [f"{end} {getattr(case.clearance_mm, end):g} mm" for end in ends] or ["no clearance"]
     others = {key: value for key, value in swept.items() if key.split(".")[0] not in UNSAID}
     return ", ".join([*words, *(f"{key} {value}" for key, value in others.items())])
 
 
 def wanted_jobs(
-    words: Sequence[str], folder: Folder, own: str
+    words: Sequence[str], folder: store.Folder, own: str
 ) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield keys and swept values of the jobs that words name, of studies without the own one."""
-    studies = {study.name: study for study in read_studies(folder)}
+    studies = {study.name: study for study in store.read_studies(folder)}
     for word in words:
         if study := studies.get(word):
-            pairs = zip(study.keys, points(study), strict=True)
+            pairs = zip(study.keys, cases.points(study), strict=True)
             yield from ((key, swept) for key, swept in pairs if key != own)
         else:
-            yield report_job(folder, word).key, {}
+            yield store.report_job(folder, word).key, {}
 
 
 def list_comparison(found: Comparison) -> Iterator[str]:
     """Yield the record and the table of jobs."""
     mine, more = found.turned, len(found.jobs) - MAX_LISTED
     rms = (found.curves.spectrum**2).sum() ** 0.5
-    turns = f"{plural(len(mine.values), 'revolution')} at {mine.rpm:.4g} rpm, {mine.rate:.6g} Hz"
-    yield f"{found.name}: {turns}, {rms:.4g} m/s2 rms up to order {found.orders}"
+    turns = digits.plural(len(mine.values), "revolution")
+    yield (f"{found.name}: {turns} at {mine.rpm:.4g} rpm, {mine.rate:.6g} Hz, "
+           f"{rms:.4g} m/s2 rms up to order {found.orders}")  # fmt: skip
     yield from (f"read: {text}" for text in found.remarks)
     rows = [("job", "what it is", "rpm", *NUMBERS.values())]
     for job in found.jobs[:MAX_LISTED]:
         numbers = map(format_number, job.likeness.values())
         rows.append((job.key[:KEY_DIGITS], job.what, f"{job.rpm:.4g}", *numbers))
-    yield from align_columns(rows, "<<" + ">" * (1 + len(NUMBERS)))
+    yield from digits.align_columns(rows, "<<" + ">" * (1 + len(NUMBERS)))
     if more > 0:
         yield f"and {more} less alike, which --json lists"
     if found.left_out:
-        yield f"left out: {plural(found.left_out)} without a sensor's record of two revolutions"
+        left = digits.plural(found.left_out)
+        yield f"left out: {left} without a sensor's record of two revolutions"
 
 
 def format_number(found: Measured) -> str:
@@ -368,13 +366,13 @@ RECORD = style.LineStyle(style.BLACK, linewidth=1.3, zorder=3.0)
 CAPTION = (
     "The record (black) beside the jobs most alike: (a) mean revolution; (b) peak and, paler, rms "
     "of each 10 degrees, on average over revolutions; (c) rms of the orders; (d) envelope above "
-    f"order {ORDER}."
+    f"order {analysis.ORDER}."
 )
 
 
-def draw_comparison(found: Comparison) -> PlotlyFigure:
+def draw_comparison(found: Comparison) -> report.PlotlyFigure:
     """Return the four panels of a comparison, the record's curves in black."""
-    drawing, grid = make_grid(2, 2, 7.4)
+    drawing, grid = report.make_grid(2, 2, 7.4)
     shown = [(found.name, found.curves, RECORD), *(
         (f"{job.key[:KEY_DIGITS]}: {job.what}", job.curves, line)
         for job, line in zip(found.jobs[:MAX_DRAWN], style.CYCLE, strict=False)
@@ -397,7 +395,7 @@ def draw_comparison(found: Comparison) -> PlotlyFigure:
     orders.x.title, orders.y.title = "order of the speed", "rms of an order (m/s²)"
     orders.x.type = orders.y.type = "log"
     orders.span("x", 1.0, found.orders)
-    envelope.y.title = f"envelope above order {ORDER} (m/s²)"
+    envelope.y.title = f"envelope above order {analysis.ORDER} (m/s²)"
     for panel in (segments, envelope):
         panel.span("y", low=0.0)
     for panel, letter in zip(grid.flat, "abcd", strict=True):

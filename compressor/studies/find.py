@@ -17,14 +17,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from compressor.cases import Study, load_studies
-from compressor.digits import align_columns, by_bar
-from compressor.metrics import AXES, BARRED, JOINTS, NUMBERS, SEGMENTS, THRESHOLDS
-from compressor.program import Progress, did_you_mean, no_progress
-from compressor.solve import average_bar
-from compressor.store import Folder, StoreError, read_store
+from compressor import cases, digits, metrics, program, solve, store, units
+from compressor.cases import Study
 from compressor.studies import frame
-from compressor.units import Units, read_quantity, unit_in
 
 # ---- the question
 
@@ -35,8 +30,8 @@ NO_COMPARISON = (
     "as 'contact_loss_fraction.small_end > 0.001', or a number and its unit, such as 166 kN"
 )
 WORDS = {
-    "joint": JOINTS, "axis": AXES, "threshold": THRESHOLDS,
-    "segment": tuple(f"{degrees:g}" for degrees in SEGMENTS),
+    "joint": metrics.JOINTS, "axis": metrics.AXES, "threshold": metrics.THRESHOLDS,
+    "segment": tuple(f"{degrees:g}" for degrees in metrics.SEGMENTS),
 }  # fmt: skip
 
 
@@ -75,7 +70,7 @@ class Goal:
     @property
     def unit(self) -> str:
         """Return the SI unit, "" for a share or a count."""
-        return "" if BARRED[self.metric].unit == "1" else BARRED[self.metric].unit
+        return "" if metrics.BARRED[self.metric].unit == "1" else metrics.BARRED[self.metric].unit
 
     def holds(self, reading: JobReading) -> bool | None:
         """Return whether the comparison holds; None where the error bar does not decide."""
@@ -91,11 +86,11 @@ class Goal:
         bars of other metrics of a chaotic motion are such intervals already.
         """
         mean = f"{self.metric}_mean"
-        averaged = regime == "chaotic" and mean in NUMBERS
+        averaged = regime == "chaotic" and mean in metrics.NUMBERS
         value = self._at(numbers, mean if averaged else self.metric)
         if averaged:
             error = np.array(self._at(numbers, f"{mean}_standard_error"))
-            bar = float(average_bar(error, int(numbers["revolutions"])))
+            bar = float(solve.average_bar(error, int(numbers["revolutions"])))
         else:
             bar = self._at(numbers, f"{self.metric}_error")
         if math.isnan(value):
@@ -109,7 +104,7 @@ class Goal:
         return JobReading(value, bar, averaged=averaged)
 
     def _at(self, numbers: np.void, name: str) -> float:
-        dims = BARRED[self.metric].dims
+        dims = metrics.BARRED[self.metric].dims
         place = tuple(WORDS[dim].index(word) for dim, word in zip(dims, self.place, strict=True))
         return float(np.asarray(numbers[name])[place])
 
@@ -121,7 +116,7 @@ def comparison(text: str) -> Goal:
         raise frame.StudyError(f"{text!r} {NO_COMPARISON}")
     goal = goal_of(parts[1], parts[2])
     try:
-        limit = read_quantity(parts[3], BARRED[goal.metric].unit)
+        limit = units.read_quantity(parts[3], metrics.BARRED[goal.metric].unit)
     except ValueError as error:
         raise frame.StudyError(f"{text!r}: {error}") from error
     if limit is None:
@@ -132,10 +127,11 @@ def comparison(text: str) -> Goal:
 def goal_of(text: str, sign: str) -> Goal:
     """Return the goal of a metric's name, METRIC or METRIC.JOINT. Raises StudyError."""
     metric, *place = text.strip().split(".")
-    if metric not in BARRED:
-        hint = did_you_mean(metric, BARRED) or f"there are {', '.join(BARRED)}"
+    if metric not in metrics.BARRED:
+        known = f"there are {', '.join(metrics.BARRED)}"
+        hint = program.did_you_mean(metric, metrics.BARRED) or known
         raise frame.StudyError(f"unknown metric {metric!r}; {hint}")
-    dims = BARRED[metric].dims
+    dims = metrics.BARRED[metric].dims
     good = len(place) == len(dims) and all(w in WORDS[d] for w, d in zip(place, dims, strict=True))
     if not good:
         words = "".join(f".{'|'.join(WORDS[dim])}" for dim in dims)
@@ -185,7 +181,7 @@ class Question:
     def _load(self, value: str) -> Study:
         """Return the study of the file with the key set, too."""
         texts = [*self.overrides, f"{self.span.key}={value}"]
-        (study,) = load_studies(self.path, overrides=texts)
+        (study,) = cases.load_studies(self.path, overrides=texts)
         return study
 
 
@@ -345,7 +341,10 @@ def bracket_best(known: Iterable[Point], factor: float) -> SearchResult:
 
 
 def find(
-    question: Question, folder: Folder, workers: int = 2, progress: Progress = no_progress
+    question: Question,
+    folder: store.Folder,
+    workers: int = 2,
+    progress: program.Progress = program.no_progress,
 ) -> SearchResult:
     """Return the answer of a question, by jobs in a folder's store.
 
@@ -362,19 +361,19 @@ def find(
     def evaluate(shares: Sequence[float]) -> list[Point]:
         values = [span.value(share) for share in shares]
         keys = study.run([(value,) for value in values])
-        store, found = read_store(folder), []
+        stored, found = store.read_store(folder), []
         for share, value, key in zip(shares, values, keys, strict=True):
-            position = store.position(key)
+            position = stored.position(key)
             if position is None:
                 if refused := study.refused.get((value,)):
                     raise refused
-                raise StoreError(folder, f"job {key} is gone", "ask again")
-            end = store.status_at(position)
+                raise store.StoreError(folder, f"job {key} is gone", "ask again")
+            end = stored.status_at(position)
             if end.status == "ok":
-                regime = store.columns["regime"][position].decode()
-                reading = question.goal.read(store.numbers([position])[0], regime)
+                regime = stored.columns["regime"][position].decode()
+                reading = question.goal.read(stored.numbers([position])[0], regime)
             else:
-                text = f"the job failed, {end.reason}: {store.detail(position)}"
+                text = f"the job failed, {end.reason}: {stored.detail(position)}"
                 reading = JobReading(reason=text)
             found.append(Point(share, value, reading, key, end.status != "ok"))
         return found
@@ -391,10 +390,10 @@ def find(
 
 
 def list_answer(
-    question: Question, answer: SearchResult, folder: Folder, units: Units
+    question: Question, answer: SearchResult, folder: store.Folder, system: units.Units
 ) -> Iterator[str]:
     """Yield an answer as it is printed: where it lies, and a row for each point."""
-    goal, (unit, factor) = question.goal, unit_in(question.goal.unit, units)
+    goal, (unit, factor) = question.goal, units.unit_in(question.goal.unit, system)
     ends = [f"{one.argument:.9g}" if one else "none" for one in (answer.low, answer.high)]
     span, steps = question.span, question.scan - 1
     if span.log:
@@ -409,13 +408,13 @@ def list_answer(
     head["scan"] = f"{question.scan} points {step}: finer changes may be missed"
     head["jobs"] = f"{len(answer.points)}, {answer.run_now} of them run now, in study "
     head["jobs"] += f"{answer.study} of {folder}"
-    yield from align_columns(head.items())
+    yield from digits.align_columns(head.items())
     title = f"{goal.metric} ({unit})" if unit else goal.metric
     rows = [(span.key, title, "", "job")]
     for point in answer.points:
         text = point.reading.reason or read(point.reading, factor)
         rows.append((f"{point.argument:.9g}", text, verdict(goal, answer, point), point.key[:8]))
-    yield from align_columns(rows, ">")
+    yield from digits.align_columns(rows, ">")
 
 
 def verdict(goal: Any, answer: SearchResult, point: Point) -> str:
@@ -430,7 +429,7 @@ def verdict(goal: Any, answer: SearchResult, point: Point) -> str:
 def read(reading: JobReading, factor: float) -> str:
     """Return a job's number with its error bar; factor: to the unit from SI."""
     bar = factor * reading.bar if reading.barred else math.nan
-    text = by_bar(factor * reading.value, bar, False)
+    text = digits.by_bar(factor * reading.value, bar, False)
     text += " (mean over revolutions: chaotic)" if reading.averaged else ""
     return text if reading.barred else f"{text} (no error bar was made)"
 

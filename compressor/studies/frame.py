@@ -13,7 +13,7 @@ import re
 import shlex
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -22,21 +22,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import xarray as xr
 
-from compressor.cases import Case, CaseFileError, Study, load_studies, points, row_of, suggestion
+from compressor import cases, metrics, program, store, sweep, vibration
+from compressor.cases import Case, Study
 from compressor.outcome import Outcome
-from compressor.program import CompsimError, Progress, no_progress, report_progress
-from compressor.store import (
-    DamagedFile,
-    Folder,
-    StoredStudy,
-    StoreError,
-    job_record,
-    read_dataset,
-    read_store,
-    write_dataset,
-)
-from compressor.sweep import Options, in_this_process, needed_parts, run_here, sweep
-from compressor.vibration import Record
+from compressor.store import StoredStudy
 
 RANGE = re.compile(r"\s*([\w.]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*(?::\s*(\d+)\s*)?")
 DIGITS = 12  # of a key's value: enough for any derivative, and short to read
@@ -46,7 +35,7 @@ RECORD_REMEDY = "write `body: true` and `sensor: {{length_rev: {length}}}` into 
 Point = tuple[float, ...]  # values of keys, in the case file's units
 
 
-class StudyError(CompsimError, ValueError):
+class StudyError(program.CompsimError, ValueError):
     """A question that a study cannot answer: and what to do."""
 
     exit_code = 2
@@ -87,12 +76,13 @@ def read_range(option: str, text: str, is_counted: bool = False, log: bool = Fal
         ends = float(low), float(high)
     except ValueError:
         ends = math.nan, math.nan
-    row = row_of(key)
+    row = cases.row_of(key)
     if not all(map(math.isfinite, ends)) or (count is not None) != is_counted:
         form = "KEY=LOW:HIGH:N, such as clearance_mm=0.01:1:60"
         problem = f"write {form if is_counted else form.replace(':N', '').replace(':60', '')}"
     elif row is None:
-        problem = f"{key} is no key of a number{suggestion(key, '') or ', such as clearance_mm'}"
+        hint = cases.suggestion(key, "") or ", such as clearance_mm"
+        problem = f"{key} is no key of a number{hint}"
     elif row.kind != "number":
         numbers = "clearance_mm or machine.speed_rpm"
         problem = f"{key} is no continuous number: give a key such as {numbers}"
@@ -120,10 +110,10 @@ class GrowingStudy:
         path: str,
         keys: Sequence[str],
         ending: str,
-        folder: Folder,
+        folder: store.Folder,
         overrides: Sequence[str] = (),
         workers: int = 2,
-        progress: Progress = no_progress,
+        progress: program.Progress = program.no_progress,
         few: int = 0,
     ):
         self.path, self.keys, self.overrides = path, tuple(keys), tuple(overrides)
@@ -131,12 +121,12 @@ class GrowingStudy:
         self.workers, self.progress, self.few = workers, progress, few
         self.name = ""
         self.jobs: dict[Point, str] = {}  # point -> key of its job
-        self.refused: dict[Point, CaseFileError] = {}
+        self.refused: dict[Point, cases.CaseFileError] = {}
         self.run_now = 0
 
     def load(self, given: Sequence[Point]) -> Study:
         """Return the study of some points. Raises CaseFileError."""
-        (found,) = load_studies(self.path, overrides=self.settings(given))
+        (found,) = cases.load_studies(self.path, overrides=self.settings(given))
         return found
 
     def settings(self, given: Sequence[Point]) -> list[str]:
@@ -150,7 +140,7 @@ class GrowingStudy:
     def find_name(self, point: Point) -> str:
         """Return the study's name: that of the case file, and the ending."""
         texts = [f"{key}={value!r}" for key, value in zip(self.keys, point, strict=True)]
-        (one,) = load_studies(self.path, overrides=replace_settings(self.overrides, *texts))
+        (one,) = cases.load_studies(self.path, overrides=replace_settings(self.overrides, *texts))
         self.name = one.name[: MAX_NAME - len(self.ending)] + self.ending
         return self.name
 
@@ -164,11 +154,11 @@ class GrowingStudy:
         if new:
             every = sorted([*self.jobs, *new])
             study, texts = self.load(every), self.settings(every)
-            few = in_this_process if len(new) < self.few else None
+            few = sweep.in_this_process if len(new) < self.few else None
             # by its verb a report knows steps of a search from jobs of a sweep
             command = shlex.join(["compsim", self.ending.split("-")[1], self.path])
-            options = Options(command, texts, backend=few)
-            done = sweep([study], self.folder, self.workers, self.progress, options)
+            options = sweep.Options(command, texts, backend=few)
+            done = sweep.sweep([study], self.folder, self.workers, self.progress, options)
             self.run_now += done.run_now
             self.jobs = dict(zip(every, study.keys, strict=True))
         return [self.jobs.get(point, "") for point in given]
@@ -177,7 +167,7 @@ class GrowingStudy:
         """Return whether a point makes a case; one that does not is noted with the reason."""
         try:
             self.load([point])
-        except CaseFileError as error:
+        except cases.CaseFileError as error:
             self.refused[point] = error
         return point not in self.refused
 
@@ -199,23 +189,26 @@ class RecordedJob(NamedTuple):
     point: Mapping[str, Any]  # its values of the study's axes
     case: Case
     outcome: Outcome
-    record: Record
+    record: vibration.Record
 
 
 def records(
-    folder: Folder, source: StoredStudy, left: Counter[str], progress: Progress = no_progress
+    folder: store.Folder,
+    source: StoredStudy,
+    left: Counter[str],
+    progress: program.Progress = program.no_progress,
 ) -> Iterator[RecordedJob]:
     """Yield the jobs of a study that are ok and have a record, each once.
 
     left: counts the others by reason. A joint counts as sound by the study's healthy clearance.
     """
-    stored = read_store(folder, warn=True)
-    own = dict(zip(source.keys, points(source), strict=True))
-    for key, point in report_progress([*own.items()], progress):
+    stored = store.read_store(folder, warn=True)
+    own = dict(zip(source.keys, cases.points(source), strict=True))
+    for key, point in program.report_progress([*own.items()], progress):
         try:
             found = stored.find_ok(key, source)
-            record = None if isinstance(found, str) else job_record(stored, key)
-        except DamagedFile:
+            record = None if isinstance(found, str) else store.job_record(stored, key)
+        except store.DamagedFile:
             left["damaged"] += 1
             continue
         if isinstance(found, str):
@@ -251,6 +244,12 @@ def hash_key(identity: Any) -> str:
     return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:20]
 
 
+def metric_numbers(names: Iterable[str]) -> Numbers:
+    """Return the `Numbers` of metrics, as `metrics.TABLE` has them."""
+    rows = {name: metrics.METRICS[name] for name in names}
+    return {name: (row.dims, row.unit, row.phrase) for name, row in rows.items()}
+
+
 def rows_dataset(
     rows: Sequence[Row], dim: str, texts: Mapping[str, str], numbers: Numbers
 ) -> xr.Dataset:
@@ -280,13 +279,13 @@ class GrowingRows(Protocol):
     def seconds(self) -> float: ...
     @property
     def size(self) -> int: ...
-    def path(self, folder: Folder) -> Path: ...
+    def path(self, folder: store.Folder) -> Path: ...
     def count_done(self, rows: Sequence[Row]) -> int: ...
     def make_row(self, rows: Sequence[Row]) -> Row: ...
     def to_dataset(self, rows: Sequence[Row]) -> xr.Dataset: ...
 
 
-def stored_rows(growing: GrowingRows, folder: Folder, rerun: bool = False) -> list[Row]:
+def stored_rows(growing: GrowingRows, folder: store.Folder, rerun: bool = False) -> list[Row]:
     """Return the rows of a file, none where there is none; rerun: those before the first failed.
 
     Raises StoreError where it is not the file of that key.
@@ -294,28 +293,28 @@ def stored_rows(growing: GrowingRows, folder: Folder, rerun: bool = False) -> li
     path = growing.path(folder)
     if not path.exists():
         return []
-    found = read_dataset(path, REMADE)
+    found = store.read_dataset(path, REMADE)
     if found.attrs.get("key") != growing.key:
-        raise StoreError(path, "does not hold what its name says", REMADE)
+        raise store.StoreError(path, "does not hold what its name says", REMADE)
     (dim,) = found["reason"].dims
     columns = {str(k): one.values for k, one in found.variables.items() if one.dims[:1] == (dim,)}
     rows = [{name: one[n] for name, one in columns.items()} for n in range(found.sizes[dim])]
     return [*itertools.takewhile(lambda row: not row["reason"], rows)] if rerun else rows
 
 
-def make_rows(growing: GrowingRows, folder: Folder, rerun: bool = False) -> None:
+def make_rows(growing: GrowingRows, folder: store.Folder, rerun: bool = False) -> None:
     """Make and store what a file does not hold yet, in a worker. Raises StoreError."""
     rows = stored_rows(growing, folder, rerun)
     while growing.count_done(rows) < growing.size:
         rows.append(growing.make_row(rows))
-        write_dataset(growing.path(folder), growing.to_dataset(rows))
+        store.write_dataset(growing.path(folder), growing.to_dataset(rows))
 
 
 def run_rows(
     every: Sequence[GrowingRows],
-    folder: Folder,
+    folder: store.Folder,
     workers: int,
-    progress: Progress,
+    progress: program.Progress,
     rerun: bool = False,
 ) -> tuple[int, dict[str, tuple[str, str]]]:
     """Make what is missing of files, side by side; return what was done before, and what was lost.
@@ -340,8 +339,10 @@ def run_rows(
 
     look()
     jobs = [(one.key, one, one.seconds) for one in missing]
-    parts = needed_parts(case for one in missing for case in one.cases)
-    running = run_here(partial(make_rows, folder=place, rerun=rerun), jobs, parts, workers, look)
+    parts = sweep.needed_parts(case for one in missing for case in one.cases)
+    running = sweep.run_here(
+        partial(make_rows, folder=place, rerun=rerun), jobs, parts, workers, look
+    )
     with contextlib.closing(running), calling_often(look):
         lost = {end.id: (str(end.reason), end.detail) for end in running if end.reason}
     look()
@@ -355,7 +356,7 @@ def calling_often(look: Callable[[], object]) -> Iterator[None]:
 
     def call() -> None:
         while not ended.wait(SECONDS_BETWEEN_LOOKS):
-            with contextlib.suppress(StoreError):  # which the last look raises again
+            with contextlib.suppress(store.StoreError):  # which the last look raises again
                 look()
 
     thread = threading.Thread(target=call, daemon=True)

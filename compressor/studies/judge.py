@@ -23,12 +23,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compressor.cases import TIGHTEST, Axis, Case, Output, Study, points
+from compressor import cases, store, sweep
+from compressor.cases import Case, Study
 from compressor.digits import plural
 from compressor.metrics import METRICS
 from compressor.program import Progress, no_progress
-from compressor.store import Folder, StoredStudy, find_study, read_store
-from compressor.sweep import Options, sweep
+from compressor.store import StoredStudy
 
 FOLDER = "judge"
 SILENT_FACTOR = 10.0  # times its bar: an error beyond it is silent
@@ -122,29 +122,31 @@ class JudgedJob:
 
 
 def judge(
-    folder: Folder, name: str | None, workers: int, progress: Progress = no_progress
+    folder: store.Folder, name: str | None, workers: int, progress: Progress = no_progress
 ) -> list[JudgedJob]:
     """Return the jobs of a stored study with their verdicts; judges that are missing are run.
 
     name: of the study; None: the only one. Progress counts the runs of a judge. Raises StoreError
     and WorkersFailed.
     """
-    source = find_study(folder, name)
+    source = store.find_study(folder, name)
     jobs = read_jobs(folder, source)
     place = Path(folder) / FOLDER
     for number in range(JUDGES):
         open_jobs = [job for job in jobs if job.is_open]
         if open_jobs:
-            cases = [judge_case(job, judges_of(job)[number]) for job in open_jobs]
-            study = study_of_judges(source, number + 1, open_jobs, cases)
-            sweep([study], place, workers, progress, Options(f"compsim judge {source.name}"))
-            hear_votes(place, open_jobs, cases)
+            trials = [judge_case(job, judges_of(job)[number]) for job in open_jobs]
+            study = study_of_judges(source, number + 1, open_jobs, trials)
+            options = sweep.Options(f"compsim judge {source.name}")
+            sweep.sweep([study], place, workers, progress, options)
+            hear_votes(place, open_jobs, trials)
     return jobs
 
 
-def read_jobs(folder: Folder, source: StoredStudy) -> list[JudgedJob]:
+def read_jobs(folder: store.Folder, source: StoredStudy) -> list[JudgedJob]:
     """Return the jobs of a study, each once."""
-    stored, own = read_store(folder), dict(zip(source.keys, points(source), strict=True))
+    stored = store.read_store(folder)
+    own = dict(zip(source.keys, cases.points(source), strict=True))
     at = stored.find([*own])
     names = [*JUDGED, *(f"{one}_error" for one in JUDGED), *COUNTS]
     numbers = stored.numbers(at, names)
@@ -180,34 +182,36 @@ def judges_of(job: JudgedJob) -> list[str]:
 def judge_case(job: JudgedJob, method: str) -> Case:
     """Return the case that a judge runs: the job's, by another method and more exactly."""
     assert job.case
-    rtol = max((TENTH if job.is_chaotic else TIGHTER) * job.rtol, TIGHTEST)
+    rtol = max((TENTH if job.is_chaotic else TIGHTER) * job.rtol, cases.TIGHTEST)
     compiled = method in ("TSIT5", "RODAS")
     settings = replace(
         job.case.solve, method=method, rtol=float(f"{rtol:.6g}"), accuracy="standard",
         error_bars=False, horizon=False, timeout_s=SECONDS,
         max_steps=COMPILED_STEPS if compiled else SCIPY_STEPS,
     )  # fmt: skip
-    output = Output(keep="metrics")
+    output = cases.Output(keep="metrics")
     return replace(job.case, solve=settings, output=output, body=None, sensor=None, wear=None)
 
 
 def study_of_judges(
-    source: StoredStudy, number: int, jobs: Sequence[JudgedJob], cases: Sequence[Case]
+    source: StoredStudy, number: int, jobs: Sequence[JudgedJob], trials: Sequence[Case]
 ) -> Study:
     """Return the study of the runs of one judge for each of some jobs."""
-    axes = [Axis(axis.key, tuple(job.point.get(axis.key) for job in jobs)) for axis in source.axes]
-    axes.append(Axis("solve.method", tuple(case.solve.method for case in cases)))
-    keys = tuple(case.key for case in cases)
+    axes = [
+        cases.Axis(axis.key, tuple(job.point.get(axis.key) for job in jobs)) for axis in source.axes
+    ]
+    axes.append(cases.Axis("solve.method", tuple(case.solve.method for case in trials)))
+    keys = tuple(case.key for case in trials)
     name = f"{source.name}-{number}"
-    return Study(name, source.case_file, tuple(axes), cases, keys, False, range(len(keys)))
+    return Study(name, source.case_file, tuple(axes), trials, keys, False, range(len(keys)))
 
 
-def hear_votes(place: Folder, jobs: Sequence[JudgedJob], cases: Sequence[Case]) -> None:
+def hear_votes(place: store.Folder, jobs: Sequence[JudgedJob], trials: Sequence[Case]) -> None:
     """Give jobs the votes of what was run for them."""
-    stored = read_store(place)
-    at = stored.find([case.key for case in cases])
+    stored = store.read_store(place)
+    at = stored.find([case.key for case in trials])
     numbers, status = stored.numbers(at, JUDGED), stored.words("status")
-    for number, (job, case) in enumerate(zip(jobs, cases, strict=True)):
+    for number, (job, case) in enumerate(zip(jobs, trials, strict=True)):
         vote = Vote(case.solve.method)
         if at[number] >= 0 and status[at[number]] == "ok":
             vote = compare(case.solve.method, job, numbers[number])

@@ -15,14 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import interpolate_hours, rubbing_work, settled_part, settled_revolutions
-from compressor.cases import Case, CaseError, Output, PerJoint, Study, Wear, points, to_si
-from compressor.metrics import JOINTS, METRICS
+from compressor import analysis, cases, report, solve, store
+from compressor.cases import Case
+from compressor.metrics import JOINTS
 from compressor.program import Progress
 from compressor.reasons import Reason
-from compressor.report import PlotlyFigure, make_grid, style
-from compressor.solve import simulate
-from compressor.store import Folder, StoreError, writable_folder
 from compressor.studies import frame
 
 FOLDER = "wear"
@@ -38,11 +35,11 @@ NUMBERS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "clearance": (("joint",), "m", "radial clearance"),
     "rubbing_work": (("joint",), "J", "normal force times sliding in a revolution"),
     "turn": ((), "s", "time of a revolution"),
-    **{name: (METRICS[name].dims, METRICS[name].unit, METRICS[name].phrase) for name in SHOWN},
+    **frame.metric_numbers(SHOWN),
 }
 
 AT_MOST = 100_000  # motions, whose wall time a machine may take
-MAX_DRAWN = len(style.CYCLE)  # machines in a figure
+MAX_DRAWN = len(report.style.CYCLE)  # machines in a figure
 
 TEXTS = {"reason": "why it ended early", "detail": "what is known of that"}
 
@@ -55,7 +52,7 @@ class Worn:
     size = 1
 
     @property
-    def wear(self) -> Wear:
+    def wear(self) -> cases.Wear:
         """Return the keys by which it wears."""
         assert self.case.wear
         return self.case.wear
@@ -68,12 +65,12 @@ class Worn:
     def clearances(self) -> np.ndarray:
         """Return the clearances of both joints, unworn (m)."""
         unworn = self.case.clearance_mm
-        return np.array([to_si(getattr(unworn, joint), "mm") for joint in JOINTS])
+        return np.array([cases.to_si(getattr(unworn, joint), "mm") for joint in JOINTS])
 
     @property
     def limit(self) -> float:
         """Return the clearance (m) of a joint that is worn out."""
-        return to_si(self.wear.limit_mm or math.inf, "mm")
+        return cases.to_si(self.wear.limit_mm or math.inf, "mm")
 
     @property
     def most_hours(self) -> float:
@@ -86,30 +83,30 @@ class Worn:
     @property
     def bore_area(self) -> np.ndarray:
         """Return the area of each unworn bore (m^2)."""
-        pins = [to_si(self.case.machine.pin_radius_mm.at(joint), "mm") for joint in JOINTS]
+        pins = [cases.to_si(self.case.machine.pin_radius_mm.at(joint), "mm") for joint in JOINTS]
         around = 2.0 * math.pi * (np.array(pins) + self.clearances)
-        return np.asarray(around * to_si(self.wear.bore_length_mm, "mm"))
+        return np.asarray(around * cases.to_si(self.wear.bore_length_mm, "mm"))
 
     @property
     def depth_per_work(self) -> np.ndarray:
         """Return the depth (m) that 1 J wears off a whole bore, by joint: Archard's law."""
-        return to_si(self.wear.coefficient_mm3_per_N_m, "mm3/(N m)") / self.bore_area
+        return cases.to_si(self.wear.coefficient_mm3_per_N_m, "mm3/(N m)") / self.bore_area
 
     def case_at(self, clearances: np.ndarray) -> Case:
         """Return the ordinary case of its motion at clearances (m), (joint,).
 
         It keeps time series, whose samples are no farther apart than `MAX_STEP_DEG`.
         """
-        case, opened = self.case, PerJoint(*(1e3 * clearances).tolist())
-        solve = case.solve
+        case, opened = self.case, cases.PerJoint(*(1e3 * clearances).tolist())
+        settings = case.solve
         if 360.0 * case.duration / case.turn / case.steps > MAX_STEP_DEG * (1 + 1e-9):
-            solve = replace(solve, output_step_deg=MAX_STEP_DEG, output_step_s=None)
+            settings = replace(settings, output_step_deg=MAX_STEP_DEG, output_step_s=None)
         return replace(
-            case, clearance_mm=opened, solve=solve, output=Output(), wear=None, body=None,
+            case, clearance_mm=opened, solve=settings, output=cases.Output(), wear=None, body=None,
             sensor=None,
         )  # fmt: skip
 
-    def path(self, folder: Folder) -> Path:
+    def path(self, folder: store.Folder) -> Path:
         return Path(folder) / FOLDER / f"{self.key}.nc"
 
     def over(self, stage: frame.Row) -> bool:
@@ -149,16 +146,16 @@ def follow_stage(machine: Worn, hours: float, clearances: np.ndarray) -> frame.R
     row: frame.Row = {"hours": hours, "clearance": clearances, "turn": math.nan,
                       "rubbing_work": np.full(len(JOINTS), math.nan)}  # fmt: skip
     try:
-        run = simulate(machine.case_at(clearances))
-    except CaseError as error:  # such as clearances that exceed the pins
-        nothing = {n: np.full([len(JOINTS)] * len(METRICS[n].dims), math.nan) for n in SHOWN}
+        run = solve.simulate(machine.case_at(clearances))
+    except cases.CaseError as error:  # such as clearances that exceed the pins
+        nothing = {n: np.full([len(JOINTS)] * len(NUMBERS[n][0]), math.nan) for n in SHOWN}
         return row | nothing | {"reason": Reason.INVALID_INPUT, "detail": str(error)}
     row |= {name: run[name].values for name in SHOWN}
     row |= {"reason": str(run["reason"].values), "detail": str(run.attrs.get("detail", ""))}
     if not row["reason"]:
-        time = settled_part(run)["time"].values
-        row["turn"] = float(np.ptp(time)) / settled_revolutions(run)
-        row["rubbing_work"] = rubbing_work(run)
+        time = analysis.settled_part(run)["time"].values
+        row["turn"] = float(np.ptp(time)) / analysis.settled_revolutions(run)
+        row["rubbing_work"] = analysis.rubbing_work(run)
     return row
 
 
@@ -167,7 +164,7 @@ def next_stage(machine: Worn, stage: frame.Row) -> frame.Row:
     opened, rate = stage["clearance"], machine.depth_per_work * stage["rubbing_work"]
     left = (machine.most_hours - stage["hours"]) * 3600.0 / stage["turn"]
     fastest = float(rate.max())  # m a revolution
-    step = to_si(machine.wear.step_mm, "mm")
+    step = cases.to_si(machine.wear.step_mm, "mm")
     span = min(step / fastest, left) if fastest > 0.0 else left  # revolutions
     midway = follow_stage(machine, math.nan, opened + 0.5 * span * rate)
     if midway["reason"]:
@@ -179,7 +176,7 @@ def next_stage(machine: Worn, stage: frame.Row) -> frame.Row:
     return follow_stage(machine, hours, opened)
 
 
-def open_wear(folder: Folder, case: Case) -> xr.Dataset:
+def open_wear(folder: store.Folder, case: Case) -> xr.Dataset:
     """Return the wear of a case's bores from a folder of results, as far as it was run.
 
     Dims: `stage`, `joint`; `hours` and `clearance` (m) by stage, with the metrics of the motion at
@@ -188,7 +185,7 @@ def open_wear(folder: Folder, case: Case) -> xr.Dataset:
     worn = Worn(case)
     rows = frame.stored_rows(worn, folder)
     if not rows:
-        raise StoreError(worn.path(folder), "is not there", "compsim wear the case file")
+        raise store.StoreError(worn.path(folder), "is not there", "compsim wear the case file")
     return worn.to_dataset(rows)
 
 
@@ -211,7 +208,9 @@ def life(machine: Worn, stages: xr.Dataset) -> Life:
     """Return the life of a machine, by straight lines between its stages."""
     opened = stages["clearance"].transpose("stage", "joint").values
     hours = stages["hours"].values
-    reached = [interpolate_hours(hours, clearance, machine.limit) for clearance in opened.T]
+    reached = [
+        analysis.interpolate_hours(hours, clearance, machine.limit) for clearance in opened.T
+    ]
     worst = int(np.argmin(reached)) if np.isfinite(reached).any() else int(opened[-1].argmax())
     found, factor, most = reached[worst], machine.wear.coefficient_factor, machine.wear.hours
     return Life(
@@ -240,7 +239,7 @@ class WornMachine:
     detail: str = ""
 
 
-def check_wear(studies: Sequence[Study]) -> None:
+def check_wear(studies: Sequence[cases.Study]) -> None:
     """Raise StudyError unless each case wears, and is measured over whole revolutions."""
     for study, case in ((one, case) for one in studies for case in one.cases):
         if case.joint == "none":
@@ -261,7 +260,11 @@ def check_wear(studies: Sequence[Study]) -> None:
 
 
 def run_wear(
-    studies: Sequence[Study], folder: Folder, workers: int, progress: Progress, rerun: bool = False
+    studies: Sequence[cases.Study],
+    folder: store.Folder,
+    workers: int,
+    progress: Progress,
+    rerun: bool = False,
 ) -> tuple[list[WornMachine], int]:
     """Follow and store the wear of all cases of studies, as far as it is missing.
 
@@ -269,18 +272,22 @@ def run_wear(
     on from their last good stage. Progress counts machines. Raises StoreError and WorkersFailed;
     whatever ends it early, what was stored stays, and the same call goes on.
     """
-    writable_folder(folder)
+    store.writable_folder(folder)
     listed = [
         (study.name, point, Worn(case))
         for study in studies
-        for point, case in zip(points(study), study.cases, strict=True)
+        for point, case in zip(cases.points(study), study.cases, strict=True)
     ]
     done, lost = frame.run_rows([worn for _, _, worn in listed], folder, workers, progress, rerun)
     return [worn_machine(*one, folder, lost.get(one[2].key)) for one in listed], done
 
 
 def worn_machine(
-    study: str, point: dict[str, Any], worn: Worn, folder: Folder, lost: tuple[str, str] | None
+    study: str,
+    point: dict[str, Any],
+    worn: Worn,
+    folder: store.Folder,
+    lost: tuple[str, str] | None,
 ) -> WornMachine:
     """Return a machine of a study by its stored stages; lost: why its worker was, if it was."""
     kept = frame.stored_rows(worn, folder)
@@ -325,7 +332,7 @@ def hours(value: float) -> str:
     return f"{value:.0f}" if value >= 1000 else f"{value:.4g}"
 
 
-def to_row(one: WornMachine, folder: Folder) -> dict[str, Any]:
+def to_row(one: WornMachine, folder: store.Folder) -> dict[str, Any]:
     """Return a machine as JSON says it."""
     found: dict[str, Any] = {"study": one.study, **one.point, "reason": one.reason}
     if one.life:
@@ -333,29 +340,31 @@ def to_row(one: WornMachine, folder: Folder) -> dict[str, Any]:
     return found
 
 
-def draw_wear(machines: Iterable[WornMachine], title: str = "") -> PlotlyFigure:
+def draw_wear(machines: Iterable[WornMachine], title: str = "") -> report.PlotlyFigure:
     """Return two panels: clearance and greatest force of each machine's worst joint by hours.
 
     Of the first machines that have a life. Shaded: with the least and the greatest coefficient.
     """
-    drawing, grid = make_grid(1, 2, 3.6)
+    drawing, grid = report.make_grid(1, 2, 3.6)
     opening, force = grid.flat
     alive = [one for one in machines if one.life]
     drawn = alive[:MAX_DRAWN]
     last = 1e-9
-    for one, line in zip(drawn, style.CYCLE, strict=False):
+    for one, line in zip(drawn, report.style.CYCLE, strict=False):
         assert one.stages is not None
         assert one.life
         stages, factor = one.stages.sel(joint=one.life.joint), one.worn.wear.coefficient_factor
         at, opened = stages["hours"].values, 1e3 * stages["clearance"].values
         opening.plot(at, opened, line)
         around = np.concatenate([at / factor, at[::-1] * factor])
-        opening.fill(around, np.concatenate([opened, opened[::-1]]), style.fill(line.color, 0.15))
+        opening.fill(
+            around, np.concatenate([opened, opened[::-1]]), report.style.fill(line.color, 0.15)
+        )
         peaks = 1e-3 * stages["peak_contact_force"].values
         force.plot(at, peaks, line, f"{name_of(one)}, {one.life.joint.replace('_', ' ')}")
         last = max(last, float(at[-1]))
     for limit in {1e3 * one.worn.limit for one in drawn if math.isfinite(one.worn.limit)}:
-        opening.rule(style.LineStyle(style.BLACK, linewidth=0.8), y=limit)
+        opening.rule(report.style.LineStyle(report.style.BLACK, linewidth=0.8), y=limit)
         opening.write("limit", 0.02 * last, limit, shift=(0, 2), size=8.5)
     opening.x.title = force.x.title = "operating hours"
     opening.span("x", 0.0, last)
@@ -364,7 +373,7 @@ def draw_wear(machines: Iterable[WornMachine], title: str = "") -> PlotlyFigure:
     force.span("y", low=0.0)
     for panel, letter in zip(grid.flat, "ab", strict=True):
         panel.title = f"({letter})"
-        panel.rule(style.LineStyle(style.GREY, linewidth=0.5, zorder=0), y=0.0)
+        panel.rule(report.style.LineStyle(report.style.GREY, linewidth=0.5, zorder=0), y=0.0)
     some = f"the first {len(drawn)} of {len(alive)} machines" * (len(drawn) < len(alive))
     drawing.title = ": ".join(filter(None, (title, some)))
     return drawing.figure()

@@ -24,23 +24,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import interpolate_hours
-from compressor.cases import Case, Wear
+from compressor import analysis, cases, report, store
 from compressor.metrics import JOINTS
 from compressor.program import Progress, no_progress
-from compressor.report import PlotlyFigure, make_grid, style
-from compressor.store import Folder, StoredStudy, find_study, read_dataset
+from compressor.report import style
 from compressor.studies import frame
-from compressor.studies.alarms.readings import (
-    ALARMS,
-    BODY_VELOCITY,
-    RECORD,
-    Alarm,
-    Band,
-    Readings,
-    Windows,
-    read_study,
-)
+from compressor.studies.alarms import readings
 
 SOUND = "none"  # the joint that is worn in a sound machine
 MIN_SOUND = 10  # draws of a sound machine: by fewer of them no limit means anything
@@ -52,7 +41,7 @@ ENDS = ("value", "low", "high")  # of a number and its interval
 WEAR_REMEDY = "compsim wear the machine's case file, and name the file, or its folder of results"
 
 
-def check_draws(source: StoredStudy, windows: Windows) -> None:
+def check_draws(source: store.StoredStudy, windows: readings.Windows) -> None:
     """Raise StudyError unless there are enough draws of a sound machine, and a worn one."""
     sound = windows.joints == SOUND
     count = len({*windows.draws[sound].tolist()})
@@ -110,7 +99,7 @@ def find_onset(clearances: np.ndarray, rates: np.ndarray) -> list[float]:
     return found
 
 
-def list_states(windows: Windows) -> Iterator[tuple[str, np.ndarray]]:
+def list_states(windows: readings.Windows) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the states of a study: a worn joint, and the rows of its windows at a clearance.
 
     In rising order. More than `MAX_LEVELS` clearances of a joint are put together into groups.
@@ -124,8 +113,9 @@ def list_states(windows: Windows) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def judge_alarms(
-    folder: Folder, study: str, bands: Sequence[Band] = (), noise: Sequence[float] = (0.0,),
-    revolutions: int = 5, false_alarms: float = 0.01, progress: Progress = no_progress,
+    folder: store.Folder, study: str, bands: Sequence[readings.Band] = (),
+    noise: Sequence[float] = (0.0,), revolutions: int = 5, false_alarms: float = 0.01,
+    progress: Progress = no_progress,
 ) -> xr.Dataset:  # fmt: skip
     """Return how often each alarm trips in each state of a stored study, and how often falsely.
 
@@ -138,8 +128,8 @@ def judge_alarms(
     `detection`, `false_alarms` and `first_clearance` (mm; inf where there is none). Raises
     StudyError, and StoreError where the store cannot be read.
     """
-    source, left = find_study(folder, study), Counter[str]()
-    windows = read_study(folder, source, bands, noise, revolutions, left, progress)
+    source, left = store.find_study(folder, study), Counter[str]()
+    windows = readings.read_study(folder, source, bands, noise, revolutions, left, progress)
     check_draws(source, windows)
     sound = windows.joints == SOUND
     draws = len({*windows.draws[sound].tolist()})
@@ -160,7 +150,9 @@ RATES = {  # name -> dims beside alarm and noise, unit, long name
 }
 
 
-def judge_windows(windows: Windows, noise: Sequence[float], false_alarms: float) -> xr.Dataset:
+def judge_windows(
+    windows: readings.Windows, noise: Sequence[float], false_alarms: float
+) -> xr.Dataset:
     """Return the `RATES` of all alarms whose reading all sound windows have."""
     sound, draws = windows.joints == SOUND, windows.draws
     states = [*list_states(windows)]
@@ -171,13 +163,15 @@ def judge_windows(windows: Windows, noise: Sequence[float], false_alarms: float)
     order = np.random.default_rng(SEED).permutation(sorted({*draws[sound].tolist()})).tolist()
     fold = np.array([order.index(one) % FOLDS if one in order else -1 for one in draws.tolist()])
 
-    def trip(alarm: Alarm, own: Readings, setting: np.ndarray) -> tuple[float, np.ndarray]:
+    def trip(
+        alarm: readings.Alarm, own: readings.Readings, setting: np.ndarray
+    ) -> tuple[float, np.ndarray]:
         """Return the limit that sound windows set, and which windows are above it."""
         scores = alarm.score(own, setting)
         limit = find_limit(scores[setting], draws[setting], false_alarms)
         return limit, scores > limit
 
-    def judge(alarm: Alarm, own: Readings) -> dict[str, Any]:
+    def judge(alarm: readings.Alarm, own: readings.Readings) -> dict[str, Any]:
         limit, trips = trip(alarm, own, sound)
         rates = np.array([compute_rate(trips[rows], draws[rows]) for _, rows in states])
         for k in range(FOLDS):
@@ -186,12 +180,14 @@ def judge_windows(windows: Windows, noise: Sequence[float], false_alarms: float)
         first = [find_onset(middle[at], rates[at]) for at in of_joint.values()]
         return dict(zip(RATES, (limit, rates, false, first), strict=True))
 
-    def is_judged(alarm: Alarm, name: str) -> bool:
+    def is_judged(alarm: readings.Alarm, name: str) -> bool:
         usual = windows.readings[0, name].get(alarm.reading, np.full(sound.shape, math.nan))[sound]
-        return bool(np.isfinite(usual).all()) and (name == RECORD or alarm.is_filtered)
+        return bool(np.isfinite(usual).all()) and (name == readings.RECORD or alarm.is_filtered)
 
     filters = [*dict.fromkeys(name for _, name in windows.readings)]
-    listed = [(alarm, name) for alarm in ALARMS for name in filters if is_judged(alarm, name)]
+    listed = [
+        (alarm, name) for alarm in readings.ALARMS for name in filters if is_judged(alarm, name)
+    ]
     judged = [[judge(alarm, windows.readings[level, name]) for level in range(len(noise))]
               for alarm, name in listed]  # fmt: skip
     found = {
@@ -245,7 +241,7 @@ def read_wear(place: str | Path) -> xr.Dataset:
             raise frame.StudyError(f"{path} has {len(files)} wear runs: {WEAR_REMEDY}")
         path = files[0]
     try:
-        run = read_dataset(path, WEAR_REMEDY)
+        run = store.read_dataset(path, WEAR_REMEDY)
     except OSError as error:
         raise frame.StudyError(f"{path}: {error.strerror}: {WEAR_REMEDY}") from error
     if not {"hours", "clearance"} <= {*run.variables} or "case" not in run.attrs:
@@ -260,12 +256,12 @@ def add_hours(found: xr.Dataset, run: xr.Dataset) -> xr.Dataset:
     is within the run's hours. The interval carries that of the clearance and the factor of the
     coefficient of wear, by which all hours grow or shrink together. run: of `read_wear`.
     """
-    case = Case.from_attribute(run.attrs["case"])
+    case = cases.Case.from_attribute(run.attrs["case"])
     hours, opened = run["hours"].values, 1e3 * run["clearance"].transpose("joint", "stage").values
-    wear = case.wear or Wear()
+    wear = case.wear or cases.Wear()
 
     def hours_at(joint: str, clearance: float) -> float:
-        return interpolate_hours(hours, opened[JOINTS.index(joint)], clearance)
+        return analysis.interpolate_hours(hours, opened[JOINTS.index(joint)], clearance)
 
     end = min(hours_at(joint, wear.limit_mm or math.inf) for joint in JOINTS)
     end = end if end <= wear.hours else math.nan
@@ -295,7 +291,7 @@ def list_rows(found: xr.Dataset) -> list[tuple[str, ...]]:
         for level, noise in enumerate(found["noise"].values.tolist()):
             for place in rank_alarms(found, joint, level):
                 one = found.isel(alarm=place, noise=level).sel(joint=joint)
-                if noise and one["kind"].item() == BODY_VELOCITY:
+                if noise and one["kind"].item() == readings.BODY_VELOCITY:
                     continue
                 row: tuple[str, ...] = (
                     joint, f"{noise:g}", one["alarm"].item(), f"{one['limit'].item():.3g}",
@@ -341,7 +337,7 @@ def list_warnings(found: xr.Dataset) -> Iterator[str]:
     if attrs["rate"] > attrs["wanted"] * (1.0 + 1e-9):
         yield (f"{attrs['sound_draws']} sound draws allow no limit for {100 * attrs['wanted']:.2g} "
                f"% of false alarms: {math.ceil(1.0 / attrs['wanted']) - 1} are needed")  # fmt: skip
-    absent = [one.title for one in ALARMS if one.title not in found["kind"].values]
+    absent = [one.title for one in readings.ALARMS if one.title not in found["kind"].values]
     if absent:
         yield f"not judged, since not all sound records have it: {', '.join(absent)}"
     needed = math.ceil(Z**2 * DETECTED / (1.0 - DETECTED))
@@ -359,13 +355,13 @@ CAPTION = (
 )
 
 
-def draw_alarms(found: xr.Dataset, title: str = "") -> PlotlyFigure:
+def draw_alarms(found: xr.Dataset, title: str = "") -> report.PlotlyFigure:
     """Return a panel a joint: the share of windows in which alarms trip, by clearance.
 
     Of the first level of noise, and of the kinds that see wear first over all joints.
     """
     joints = found["joint"].values.tolist()
-    drawing, grid = make_grid(1, len(joints), 3.6)
+    drawing, grid = report.make_grid(1, len(joints), 3.6)
     kinds = found["kind"].values
     best = {joint: {kinds[place]: place for place in rank_alarms(found, joint)} for joint in joints}
     first = sorted(

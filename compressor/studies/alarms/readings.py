@@ -8,22 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compressor.analysis import faulty_joints
-from compressor.cases import Sensor
+from compressor import analysis, cases, store, vibration
 from compressor.program import Progress
-from compressor.store import Folder, StoredStudy
+from compressor.store import StoredStudy
 from compressor.studies import frame
-from compressor.vibration import (
-    USABLE,
-    Record,
-    RecordError,
-    band_signal,
-    check_record,
-    cut_windows,
-    measure_record,
-    noisy,
-    turns_at,
-)
 
 RECORD = "record"  # the filter's name of a record as it is
 FRAME_HZ = (2.0, 1000.0)  # ours: the band in which frames are judged by body_velocity_rms
@@ -108,7 +96,7 @@ def default_bands(rate: float, passes: float) -> tuple[Band, ...]:
     record holds above the frame's band, equally in its logarithm.
     """
     low, edge = FRAME_HZ
-    top = min(rate / USABLE, passes)
+    top = min(rate / vibration.USABLE, passes)
     if top <= 2.0 * edge:
         return ((low, min(edge, top)),)
     middle = float(f"{math.sqrt(edge * top):.2g}")
@@ -116,7 +104,7 @@ def default_bands(rate: float, passes: float) -> tuple[Band, ...]:
 
 
 def read_windows(
-    record: Record, revolutions: int, bands: Sequence[Band], velocity_band: Band,
+    record: vibration.Record, revolutions: int, bands: Sequence[Band], velocity_band: Band,
     noise: float, seed: Sequence[int],
 ) -> dict[str, Readings]:  # fmt: skip
     """Return the readings of a record's windows by filter, `RECORD` first; {} of a shorter record.
@@ -125,22 +113,25 @@ def read_windows(
     filter removes the other lines of the spectrum of all revolutions. Raises RecordError as
     `check_record`.
     """
-    whole = check_record(record.times, record.values, record.tacho)
-    ((_, record),) = cut_windows(record, whole)
-    values, rate = noisy(record.values, noise, seed), record.rate
+    whole = vibration.check_record(record.times, record.values, record.tacho)
+    ((_, record),) = vibration.cut_windows(record, whole)
+    values, rate = vibration.noisy(record.values, noise, seed), record.rate
     signals = {RECORD: values}
-    signals |= {f"{low:g}-{high:g} Hz": band_signal(values, rate, low, high) for low, high in bands}
+    signals |= {
+        f"{low:g}-{high:g} Hz": vibration.band_signal(values, rate, low, high)
+        for low, high in bands
+    }
     found = {}
     for name, signal in signals.items():
-        windows = cut_windows(replace(record, values=signal), revolutions)
+        windows = vibration.cut_windows(replace(record, values=signal), revolutions)
         if rows := [
-            read_window(one.values, turns_at(one.times, one.tacho), revolutions)
+            read_window(one.values, vibration.turns_at(one.times, one.tacho), revolutions)
             for _, one in windows
         ]:
             found[name] = {key: np.array([row[key] for row in rows]) for key in rows[0]}
     if found:
         speed = band_velocity(values, rate, *velocity_band)
-        windows = cut_windows(replace(record, values=speed), revolutions)
+        windows = vibration.cut_windows(replace(record, values=speed), revolutions)
         found[RECORD]["velocity"] = np.array(
             [[np.sqrt(np.mean(one.values**2))] for _, one in windows]
         )
@@ -150,7 +141,7 @@ def read_windows(
 def read_window(values: np.ndarray, turns: np.ndarray, revolutions: int) -> Readings:
     """Return the readings of one window, (numbers,) each; counts at all levels of `LADDER`."""
     below = int(np.searchsorted(LADDER, np.abs(values).max()))  # levels that a peak passes
-    numbers = measure_record(values, turns, revolutions, LADDER[:below].tolist())
+    numbers = vibration.measure_record(values, turns, revolutions, LADDER[:below].tolist())
     found = {name: np.atleast_1d(np.asarray(one, float)) for name, one in numbers.items()}
     counts = np.zeros(LADDER.size)
     counts[:below] = found.get("sensor_counts_per_rev", np.empty(0))
@@ -162,7 +153,7 @@ def band_velocity(values: np.ndarray, rate: float, low: float, high: float) -> n
 
     The lines of the band over 2 pi i f; none at 0 Hz, where none follows from an acceleration.
     """
-    lines = np.fft.rfft(band_signal(values, rate, low, high))
+    lines = np.fft.rfft(vibration.band_signal(values, rate, low, high))
     omega = 2.0j * np.pi * np.fft.rfftfreq(len(values), 1.0 / rate)
     omega[0], lines[0] = 1.0, 0.0
     return np.fft.irfft(lines / omega, len(values))
@@ -185,7 +176,7 @@ class Windows:
 
 
 def read_study(
-    folder: Folder, source: StoredStudy, bands: Sequence[Band], noise: Sequence[float],
+    folder: store.Folder, source: StoredStudy, bands: Sequence[Band], noise: Sequence[float],
     revolutions: int, left: Counter[str], progress: Progress,
 ) -> Windows:  # fmt: skip
     """Return the windows of all jobs of a study that have a record. Raises StudyError.
@@ -213,7 +204,7 @@ def read_study(
                 seed = [SEED, int(job.key, 16), level]
                 read = read_windows(record, revolutions, bands, in_band, rms, seed)
                 own |= {(level, name): one for name, one in read.items()}
-        except RecordError:
+        except vibration.RecordError:
             left["silent_record"] += 1
             continue
         count = len(own[0, RECORD]["sensor_rms"])
@@ -223,11 +214,11 @@ def read_study(
                 one["body_velocity_rms"] = np.tile(velocity, (count, 1))
             readings[place].append(one)
         joint = case.worn_joint
-        sides = faulty_joints(joint)
+        sides = analysis.faulty_joints(joint)
         clearance = max(getattr(case.clearance_mm, side, math.nan) for side in sides)
         varied = {k: one for k, one in job.point.items() if k.partition(".")[0] not in NO_DRAW}
         rows += [(joint, clearance, json.dumps(varied, sort_keys=True), job.key)] * count
-        clipped += float(job.outcome.numbers["clipped_fraction"]) >= Sensor.REPORTED
+        clipped += float(job.outcome.numbers["clipped_fraction"]) >= cases.Sensor.REPORTED
     if not rows:
         raise frame.no_records(source, left, revolutions)
     stacked = {

@@ -14,12 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from compressor.cases import Case, Sensor
+from compressor import cases, store, vibration
+from compressor.cases import Case
 from compressor.program import Progress, no_progress
-from compressor.store import Folder, find_study
 from compressor.studies import frame
 from compressor.studies.diagnosis.features import FEATURES, features
-from compressor.vibration import RecordError, cut_windows
 
 # groups of a case that are no part of a machine
 NOT_BUILT = (
@@ -70,7 +69,10 @@ LABELS = {
 
 
 def make_data_set(
-    folder: Folder, study: str | None = None, revolutions: int = 5, progress: Progress = no_progress
+    folder: store.Folder,
+    study: str | None = None,
+    revolutions: int = 5,
+    progress: Progress = no_progress,
 ) -> xr.Dataset:
     """Return the labelled windows of a stored study; None: the store's only one.
 
@@ -80,7 +82,7 @@ def make_data_set(
     that give no window are counted in the attribute `left_out`. In memory are the windows, 4 bytes
     a sample. Raises StudyError where nothing is left, StoreError where the store cannot be read.
     """
-    source = find_study(folder, study)
+    source = store.find_study(folder, study)
     left: Counter[str] = Counter()
     rows: list[dict[str, Any]] = []
     clipped: list[float] = []
@@ -94,9 +96,9 @@ def make_data_set(
                     "signal": window.values.astype(np.float32), "rate": window.rate,
                     "tacho": window.tacho.copy(),
                 }
-                for first, window in cut_windows(job.record, revolutions)
+                for first, window in vibration.cut_windows(job.record, revolutions)
             ]  # fmt: skip
-        except RecordError:
+        except vibration.RecordError:
             left["silent_record"] += 1
             continue
         left["too_short"] += not own
@@ -109,7 +111,7 @@ def make_data_set(
         study=source.name, case_file=source.case_file, fixed=json.dumps(source.fixed),
         versions=json.dumps(source.versions), jobs=len({*source.keys}), left_out=json.dumps(+left),
         revolutions=revolutions, clipped_most=float(np.nanmax([0.0, *clipped])),
-        clipped_records=sum(share >= Sensor.REPORTED for share in clipped),
+        clipped_records=sum(share >= cases.Sensor.REPORTED for share in clipped),
     )  # fmt: skip
 
 

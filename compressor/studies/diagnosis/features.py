@@ -10,18 +10,7 @@ import math
 
 import numpy as np
 
-from compressor.analysis import ORDER
-from compressor.vibration import (
-    Record,
-    RecordError,
-    by_revolutions,
-    cut_windows,
-    energy_angle,
-    envelope_spectrum,
-    high_pass_orders,
-    line_amplitudes,
-    shape,
-)
+from compressor import analysis, vibration
 
 SECTORS = 24  # of crank angle, 15 degrees each
 BANDS = (0.0, 200.0, 400.0, 700.0, 1100.0, 1700.0, 2300.0, 4000.0, 7000.0)  # edges, Hz
@@ -30,7 +19,7 @@ BEATS = (1, 2, 3, 4)  # orders of the envelope
 SMALLEST = 1e-6  # share that the logarithm of a share is taken of at least
 
 
-ABOVE = f"the energy above order {ORDER}"
+ABOVE = f"the energy above order {analysis.ORDER}"
 FEATURES = {  # name -> phrase
     "level": "log10 of the rms in m/s2",
     "speed": "log10 of the speed in rev/s",
@@ -48,25 +37,25 @@ FEATURES = {  # name -> phrase
 }  # fmt: skip
 
 
-def features(record: Record) -> dict[str, float]:
+def features(record: vibration.Record) -> dict[str, float]:
     """Return the `FEATURES` of a record by name.
 
     A crank angle is known to a sample. Raises RecordError for fewer than two revolutions, pulses
     that do not increase or lie beyond the samples, and values that are not all numbers, or all
     zero.
     """
-    turned = by_revolutions(record, SECTORS)
+    turned = vibration.by_revolutions(record, SECTORS)
     even, a_turn, speed = turned.values.ravel(), turned.values.shape[1], turned.speed
-    ((_, whole),) = cut_windows(record, len(turned.values))
+    ((_, whole),) = vibration.cut_windows(record, len(turned.values))
     if not np.any(whole.values):
-        raise RecordError("the record's values are all zero: they hold no signal")
-    size, *shapes = shape(even)
+        raise vibration.RecordError("the record's values are all zero: they hold no signal")
+    size, *shapes = vibration.shape(even)
     found = {"level": math.log10(size), "speed": math.log10(speed)}
     found |= dict(zip(("crest_factor", "kurtosis", "gini"), shapes, strict=True))
-    high = high_pass_orders(even, a_turn, ORDER)
+    high = vibration.high_pass_orders(even, a_turn, analysis.ORDER)
     each = high.reshape(-1, a_turn)
     energy = float(np.mean(high**2))
-    found["energy_angle"] = energy_angle(high) if energy else math.nan
+    found["energy_angle"] = vibration.energy_angle(high) if energy else math.nan
     found["above_swing"] = log_share(energy, float(np.mean(even**2)))
     found["synchronous"] = float(np.mean(each.mean(axis=0) ** 2)) / energy if energy else math.nan
     found |= bands(whole.values, turned.rate)
@@ -79,7 +68,7 @@ def features(record: Record) -> dict[str, float]:
 
 def bands(values: np.ndarray, rate: float) -> dict[str, float]:
     """Return the log10 of each band's share of the energy."""
-    amplitudes = line_amplitudes(values - values.mean(), values.size, True)
+    amplitudes = vibration.line_amplitudes(values - values.mean(), values.size, True)
     frequency = np.arange(amplitudes.size) * rate / values.size
     power = amplitudes**2
     power[frequency > rate / 2.0 * (1.0 - 1e-9)] = 0.0  # a line of even numbers of samples alone
@@ -97,7 +86,7 @@ def envelope(even: np.ndarray, a_turn: int, speed: float) -> dict[str, float]:
     low, high = (min(edge / speed, top) for edge in ENVELOPE)
     if not low < high:
         return {f"envelope_{beat}": math.nan for beat in BEATS}
-    _, lines = envelope_spectrum(even, float(a_turn), (low, high))
+    _, lines = vibration.envelope_spectrum(even, float(a_turn), (low, high))
     revolutions = even.size // a_turn
     return {f"envelope_{beat}": lines[beat * revolutions] / lines[0] for beat in BEATS}
 

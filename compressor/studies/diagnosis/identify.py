@@ -22,14 +22,13 @@ from sklearn.linear_model import LogisticRegression
 from sklearn.model_selection import StratifiedGroupKFold, cross_val_predict
 from sklearn.neighbors import KNeighborsRegressor, NearestNeighbors
 
+from compressor import store, vibration
 from compressor.digits import align_columns
 from compressor.metrics import JOINTS
 from compressor.program import Progress, no_progress
-from compressor.store import Folder, find_study
 from compressor.studies import frame
 from compressor.studies.diagnosis.dataset import name_machine
 from compressor.studies.diagnosis.features import features
-from compressor.vibration import MIN_REVOLUTIONS, Record, RecordError
 
 MIN_JOBS, MIN_IN_ALL = 30, 200  # jobs of one joint, for it to be identified, and of all
 FOLDS = 10  # of machines
@@ -75,20 +74,20 @@ class Library:
         return replace(self, **{name: getattr(self, name)[mask] for name in columns})
 
 
-def read_library(folder: Folder, study: str, progress: Progress = no_progress) -> Library:
+def read_library(folder: store.Folder, study: str, progress: Progress = no_progress) -> Library:
     """Return the library of a stored study. Raises StudyError without a record, and StoreError."""
-    source, left = find_study(folder, study), Counter[str]()
+    source, left = store.find_study(folder, study), Counter[str]()
     rows: list[tuple[Any, ...]] = []
     for job in frame.records(folder, source, left, progress):
         try:
             found = np.array([*features(job.record).values()])
-        except RecordError:
+        except vibration.RecordError:
             left["silent_record"] += 1
             continue
         ends = [getattr(job.case.clearance_mm, side) for side in JOINTS]
         rows.append((job.key, job.case.worn_joint, ends, found, name_machine(job.case)))
     if not rows:
-        raise frame.no_records(source, left, MIN_REVOLUTIONS)
+        raise frame.no_records(source, left, vibration.MIN_REVOLUTIONS)
     keys_of = (axis.key for axis in source.axes)
     swept = [key for key in keys_of if key.partition(".")[0] not in IDENTIFIED]
     keys, joints, opened, found, machines = map(np.array, zip(*rows, strict=True))
@@ -303,7 +302,7 @@ class Identifier:
 
 
 def explain_record(
-    record: Record, folder: Folder, study: str, key: str, progress: Progress
+    record: vibration.Record, folder: store.Folder, study: str, key: str, progress: Progress
 ) -> tuple[Identifier, Identification]:
     """Return the joints that explain a record by a stored study, and the identifier.
 

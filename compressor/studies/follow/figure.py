@@ -10,9 +10,9 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import SPOKEN
+from compressor import analysis, report
 from compressor.digits import align_columns
-from compressor.report import Panel, PlotlyFigure, make_grid, midway, positions, style
+from compressor.report import style
 
 # the second is smaller and lies on the first, so that both are seen where they agree
 BY_DIRECTION = {"up": (style.BLUE, 4.0, 2.2), "down": (style.RED, 2.1, 2.4)}
@@ -62,14 +62,16 @@ def title_key(over: xr.DataArray) -> str:
     return f"{name} ({unit})" if unit != "1" else name
 
 
-def draw_followed(machine: xr.Dataset, title: str = "") -> PlotlyFigure:
+def draw_followed(machine: xr.Dataset, title: str = "") -> report.PlotlyFigure:
     """Return one machine over the key: Poincaré points, period, exponent, time without contact."""
     over, known = machine.attrs["over"], machine["section"].notnull()
     known = known.any([dim for dim in known.dims if dim != "joint"])
     joints = [str(joint) for joint in machine["joint"].values[known.values]]
-    x, log = positions(machine, over), bool(machine.attrs["log"])
+    x, log = report.positions(machine, over), bool(machine.attrs["log"])
     ratios = [2.2] * len(joints) + [1.2, 1.4] + [0.8] * len(joints)
-    drawing, _ = make_grid(len(ratios), 1, 1.35 * sum(ratios) + 1.2, heights=ratios, share_x="all")
+    drawing, _ = report.make_grid(
+        len(ratios), 1, 1.35 * sum(ratios) + 1.2, heights=ratios, share_x="all"
+    )
     panels = drawing.panels
     chains = {str(name): machine.sel(direction=name) for name in machine["direction"].values}
     for panel in panels:
@@ -79,7 +81,9 @@ def draw_followed(machine: xr.Dataset, title: str = "") -> PlotlyFigure:
                   for name, chain in chains.items()}  # fmt: skip
         panel.label("y", "e<sub>x</sub> (mm)")
         plot(panel, x, {name: MILLI * one.values for name, one in points.items()}, 0.7)
-        panel.title = f"journal's place along the cylinder, {SPOKEN[joint]}, once a revolution"
+        panel.title = (
+            f"journal's place along the cylinder, {analysis.SPOKEN[joint]}, once a revolution"
+        )
         leave_room(panel)
     plot_periods(panels[len(joints)], x, chains)
     plot_exponents(panels[len(joints) + 1], x, chains)
@@ -87,17 +91,17 @@ def draw_followed(machine: xr.Dataset, title: str = "") -> PlotlyFigure:
         shares = {name: 100.0 * chain["contact_loss_fraction"].sel(joint=joint).values
                   for name, chain in chains.items()}  # fmt: skip
         plot(panel, x, shares)
-        panel.title = f"time without dry contact, {SPOKEN[joint]}"
+        panel.title = f"time without dry contact, {analysis.SPOKEN[joint]}"
         panel.y.title = "%"
         leave_room(panel)
-    low, *_, high = midway(np.sort(x), log)
+    low, *_, high = report.midway(np.sort(x), log)
     panels[0].span("x", low, high)
     drawing.title = title
     return drawing.figure()
 
 
 def plot(
-    panel: Panel, x: np.ndarray, of: dict[str, np.ndarray], times: float = 1.0,
+    panel: report.Panel, x: np.ndarray, of: dict[str, np.ndarray], times: float = 1.0,
     bars: Mapping[str, np.ndarray] | None = None,
 ) -> None:  # fmt: skip
     """Draw numbers at each value, (values,) or (values, n), by direction, in marks of its own.
@@ -111,7 +115,7 @@ def plot(
         panel.plot(at, numbers.ravel(), look, name, (bars or {}).get(name))
 
 
-def plot_periods(panel: Panel, x: np.ndarray, chains: dict[str, xr.Dataset]) -> None:
+def plot_periods(panel: report.Panel, x: np.ndarray, chains: dict[str, xr.Dataset]) -> None:
     """Draw the period at each value; above it where there is none."""
     plot(panel, x, {name: period_rows(chain) for name, chain in chains.items()}, 1.2)
     rows = PERIODS | ROWS_OF
@@ -130,7 +134,7 @@ def period_rows(chain: xr.Dataset) -> np.ndarray:
     return np.where(is_ok, rows, np.nan)
 
 
-def plot_exponents(panel: Panel, x: np.ndarray, chains: dict[str, xr.Dataset]) -> None:
+def plot_exponents(panel: report.Panel, x: np.ndarray, chains: dict[str, xr.Dataset]) -> None:
     """Draw the largest Lyapunov exponent with its error at each value."""
     bars = {}
     for name, chain in chains.items():
@@ -145,7 +149,7 @@ def plot_exponents(panel: Panel, x: np.ndarray, chains: dict[str, xr.Dataset]) -
     leave_room(panel)
 
 
-def leave_room(panel: Panel) -> None:
+def leave_room(panel: report.Panel) -> None:
     """Leave a little room below and above the points."""
     drawn = np.concatenate([trace.y for trace in panel.traces])
     low, high = (np.nanmin(drawn), np.nanmax(drawn)) if np.isfinite(drawn).any() else (0.0, 1.0)

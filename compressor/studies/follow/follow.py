@@ -19,10 +19,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from compressor.cases import Case, CaseFileError, Output, Study, load_studies, points
+from compressor import cases, store
+from compressor.cases import Case, Study
 from compressor.metrics import JOINTS
 from compressor.program import Progress
-from compressor.store import Folder, coordinate_names, swept_column, writable_folder, write_dataset
 from compressor.studies import frame
 from compressor.studies.follow import motion
 
@@ -62,7 +62,9 @@ def read_over(text: str, log: bool = False, **more: Any) -> KeyRange:
     return KeyRange(**vars(span), **more)
 
 
-def load_values(path: Folder, along: KeyRange, overrides: Sequence[str] = (), **how: Any) -> Study:
+def load_values(
+    path: store.Folder, along: KeyRange, overrides: Sequence[str] = (), **how: Any
+) -> Study:
     """Return the study of a case file with a job for each machine and value of the key.
 
     how: of `load_studies`. Raises CaseFileError, in which the values stand under --over.
@@ -70,11 +72,11 @@ def load_values(path: Folder, along: KeyRange, overrides: Sequence[str] = (), **
     form = "logspace" if along.log else "linspace"
     values = f"{along.key}={{{form}: [{along.low!r}, {along.high!r}, {along.count}]}}"
     try:
-        (study,) = load_studies(path, overrides=[*overrides, values], **how)
-    except CaseFileError as error:
+        (study,) = cases.load_studies(path, overrides=[*overrides, values], **how)
+    except cases.CaseFileError as error:
         asked = f"--over {along.key}={along.low:g}:{along.high:g}:{along.count}"
         ours = f"--set {along.key}={{{form}"
-        raise CaseFileError([
+        raise cases.CaseFileError([
             replace(problem, place=replace(problem.place, file=asked))
             if problem.place.file.startswith(ours) else problem
             for problem in error.problems
@@ -99,7 +101,7 @@ class Chain:
         keys = [case.key for case in self.cases]
         return frame.hash_key([keys, [self.points, self.exponent], SCHEMA])
 
-    def path(self, folder: Folder) -> Path:
+    def path(self, folder: store.Folder) -> Path:
         return Path(folder) / FOLDER / "chains" / f"{self.key}.nc"
 
     @property
@@ -137,11 +139,13 @@ def machines(study: Study, along: KeyRange) -> list[FollowedMachine]:
     """Return the machines of the selected jobs of `load_values`. Raises StudyError."""
     selected, listed = {*study.selected}, []
     found: dict[str, tuple[dict[str, Any], list[tuple[float, Case]]]] = {}
-    for number, point in enumerate(points(study)):
+    for number, point in enumerate(cases.points(study)):
         if number in selected:
             value = point.pop(along.key, math.nan)  # an ideal machine has no clearance
             # what does not change how the machine moves makes no other chain
-            case = replace(study.cases[number], output=Output(), wear=None, body=None, sensor=None)
+            case = replace(
+                study.cases[number], output=cases.Output(), wear=None, body=None, sensor=None
+            )
             found.setdefault(repr(point), (point, []))[1].append((value, case))
     for point, jobs in found.values():
         if problem := objection(along, [case for _, case in jobs]):
@@ -149,22 +153,22 @@ def machines(study: Study, along: KeyRange) -> list[FollowedMachine]:
             raise frame.StudyError(f"{study.path}: {problem}{f' ({where})' if where else ''}")
         jobs.sort(key=itemgetter(0))
         ways = ((*zip(*one, strict=True),) for one in (jobs, jobs[::-1])[: len(along.ways)])
-        chains = (Chain(cases, values, along.points, along.exponent) for values, cases in ways)
+        chains = (Chain(some, values, along.points, along.exponent) for values, some in ways)
         listed.append(FollowedMachine(point, (*chains,)))
     return listed
 
 
-def objection(along: KeyRange, cases: Sequence[Case]) -> str:
+def objection(along: KeyRange, some: Sequence[Case]) -> str:
     """Return why a machine cannot be followed, or ""."""
-    worn = {tuple(getattr(case.clearance_mm, joint) > 0 for joint in JOINTS) for case in cases}
+    worn = {tuple(getattr(case.clearance_mm, joint) > 0 for joint in JOINTS) for case in some}
     if len(worn) > 1:
         return f"--over begins at {along.key} = {along.low:g}, where a joint is ideal: begin above"
     if not any(*worn):
         return "no joint has clearance, so that nothing is to follow: set joint and clearance_mm"
-    if len(cases) < 2:
+    if len(some) < 2:
         one = f"--over {along.key} has one value of this machine"
         return f"{one}: give more, or mend --only, exclude or zip"
-    if cases[0].key == cases[-1].key:
+    if some[0].key == some[-1].key:
         return f"--over {along.key} changes nothing in this machine: follow another key"
     return ""
 
@@ -181,7 +185,7 @@ class Followed(NamedTuple):
 def follow(
     study: Study,
     along: KeyRange,
-    folder: Folder,
+    folder: store.Folder,
     workers: int,
     progress: Progress,
     rerun: bool = False,
@@ -193,7 +197,7 @@ def follow(
     was stored stays, and the same call goes on.
     """
     every = machines(study, along)
-    writable_folder(folder)
+    store.writable_folder(folder)
     chains = [chain for machine in every for chain in machine.chains]
     before, lost = frame.run_rows(chains, folder, workers, progress, rerun)
     rows = [
@@ -202,11 +206,13 @@ def follow(
     ]
     data = followed_dataset(study, along, every, rows)
     path = Path(folder) / FOLDER / f"{study.name}-{along.key}.nc"
-    write_dataset(path, data)
+    store.write_dataset(path, data)
     return Followed(sum(chain.size for chain in chains), before, data, path)
 
 
-def rows_to_show(chain: Chain, folder: Folder, lost: tuple[str, str] | None) -> list[frame.Row]:
+def rows_to_show(
+    chain: Chain, folder: store.Folder, lost: tuple[str, str] | None
+) -> list[frame.Row]:
     """Return the rows of a chain, at least one; lost: why it was, at the value after them."""
     rows = frame.stored_rows(chain, folder)
     blank = motion.empty_row(chain.cases[0], chain.points) | {"status": "missing"}
@@ -261,11 +267,11 @@ def followed_dataset(
         about = {"units": "1", "long_name": "1: up and down end in different motions here"}
         data["differs"] = ("job", "value"), marked, about
     keys = [*dict.fromkeys(key for machine in every for key in machine.point)]
-    names = coordinate_names([*keys, along.key])
+    names = store.coordinate_names([*keys, along.key])
     swept = {key: [machine.point.get(key) for machine in every] for key in keys}
     data = data.rename(value=(over := names[along.key])).assign_coords(
-        {names[key]: ("job", *swept_column(key, column)) for key, column in swept.items()}
-        | {over: (over, *swept_column(along.key, values))}
+        {names[key]: ("job", *store.swept_column(key, column)) for key, column in swept.items()}
+        | {over: (over, *store.swept_column(along.key, values))}
     )
     data = data.assign_coords(
         direction=("direction", [*along.ways], {"long_name": "which way it is followed"}),

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from compressor import solve
 from compressor.cases import Case
-from compressor.solve import Request, integrate, natural_sizes, parts, record, standard_error, sure
 
 RTOL = 1e-12  # of both runs, whatever the case has
 SHIFT = 1e-6  # natural sizes: how far from the motion the other one starts
@@ -63,8 +63,8 @@ def largest_exponent(case: Case, state: np.ndarray, revolutions: int, timeout: f
     time (s). The case's own method, tolerance and max_steps do not count. The same call gives the
     same numbers to the bit, unless the time is up.
     """
-    p, deadline = record(case), time.monotonic() + timeout
-    size, times = natural_sizes(p), case.turn * np.arange(INTERVALS + 1) / INTERVALS
+    p, deadline = solve.record(case), time.monotonic() + timeout
+    size, times = solve.natural_sizes(p), case.turn * np.arange(INTERVALS + 1) / INTERVALS
     # positions and rates alone: what else a state holds, such as a crank's lag, need not fade
     moving = 2 * int(p["freedoms"])
     push = np.zeros(state.size)
@@ -73,7 +73,9 @@ def largest_exponent(case: Case, state: np.ndarray, revolutions: int, timeout: f
     def run(start: np.ndarray) -> np.ndarray:
         """Return a motion at all `times`, nan from where it stopped."""
         left = deadline - time.monotonic()
-        return integrate(Request(p, start, times, 0.0, RTOL, "auto", MAX_STEPS, left)).states
+        return solve.integrate(
+            solve.Request(p, start, times, 0.0, RTOL, "auto", MAX_STEPS, left)
+        ).states
 
     def follow(difference: np.ndarray) -> np.ndarray:
         """Return a difference over the next revolution, (INTERVALS, n), in natural sizes."""
@@ -122,5 +124,5 @@ def mean_with_error(values: np.ndarray) -> tuple[float, float]:
 
     Of values that too few batches hold, the first are left out; inf where there is one batch.
     """
-    means = np.array([part.mean() for part in parts(values, MAX_BATCHES, MIN_BATCH)])
-    return float(means.mean()), float(sure(standard_error(means), len(means)))
+    means = np.array([part.mean() for part in solve.parts(values, MAX_BATCHES, MIN_BATCH)])
+    return float(means.mean()), float(solve.sure(solve.standard_error(means), len(means)))

@@ -13,29 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compressor.cases import Case, Output
-from compressor.metrics import AXES, JOINTS, METRICS
+from compressor import cases, physics, solve
+from compressor.cases import Case
+from compressor.metrics import AXES, JOINTS
 from compressor.outcome import Regime
-from compressor.physics import merge_tallies, state_names
 from compressor.reasons import Reason
-from compressor.solve import (
-    Metrics,
-    Trajectory,
-    allowed_residual,
-    energy_residual,
-    find_repetition,
-    least_promise,
-    metrics,
-    next_audit_rtol,
-    record,
-    revolutions,
-    run_at_tolerance,
-    statistics,
-    steady,
-    with_settle_rev,
-)
+from compressor.studies import frame
 from compressor.studies.follow.lyapunov import largest_exponent
-from compressor.studies.frame import Row
 
 SETTLE_REV = 50  # most revolutions dropped at each value
 EXPONENT_REV = 16  # of a motion that repeats itself, for its exponent
@@ -71,7 +55,7 @@ NUMBERS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "lyapunov_exponent_error": ((), "1/rev", "error of the largest Lyapunov exponent"),
     "settled_rev": ((), "rev", "revolution at this value from which on metrics agree"),
     "revolutions": ((), "rev", "revolutions that the numbers are of"),
-    **{name: (METRICS[name].dims, METRICS[name].unit, METRICS[name].phrase) for name in MEASURED},
+    **frame.metric_numbers(MEASURED),
     "rms_acceleration_standard_error": ((), "m/s2", "standard error of rms_acceleration"),
     "end_state": (("number",), "1", "motion at the end, as the solver holds it, in SI"),
 }  # fmt: skip
@@ -94,7 +78,7 @@ class RevolutionRun:
     detail: str
 
 
-def run_value(case: Case, state: np.ndarray | None, most: int, wants_exponent: bool) -> Row:
+def run_value(case: Case, state: np.ndarray | None, most: int, wants_exponent: bool) -> frame.Row:
     """Follow a case from a state on, or from its own start, until it settles, and measure it.
 
     most: Poincaré points of a motion that does not repeat itself; wants_exponent: whether the
@@ -109,7 +93,7 @@ def run_value(case: Case, state: np.ndarray | None, most: int, wants_exponent: b
     run, since = settle_motion(case, state, deadline)
     if run.reason:
         return failed_row(row, run)
-    within, clearance = tolerance(case), record(case)["clearance"].copy()
+    within, clearance = tolerance(case), solve.record(case)["clearance"].copy()
 
     def period_in(turns: list[np.record], points: np.ndarray) -> int | None:
         return period_of(places(points, clearance), within)
@@ -137,7 +121,7 @@ def run_value(case: Case, state: np.ndarray | None, most: int, wants_exponent: b
     worn = clearance > 0.0  # an ideal joint's journal does not move
     row["section"][: len(points), worn] = points[:, worn]
     measured = run.turns[-count:]
-    together = metrics(run.p, merge_tallies(measured))
+    together = solve.metrics(run.p, physics.merge_tallies(measured))
     known = {name: together[name] for name in MEASURED} | {
         "period": float(period or math.nan),
         "lyapunov_exponent": exponent,
@@ -146,7 +130,7 @@ def run_value(case: Case, state: np.ndarray | None, most: int, wants_exponent: b
         "revolutions": count,
         # by batch means (`compressor.solve.run_metrics`); inf where there are too few
         "rms_acceleration_standard_error": (
-            statistics(run.p, measured)["rms_acceleration_standard_error"]
+            solve.statistics(run.p, measured)["rms_acceleration_standard_error"]
         ),
         "end_state": run.state,
     }
@@ -154,11 +138,11 @@ def run_value(case: Case, state: np.ndarray | None, most: int, wants_exponent: b
     return row | {"status": "ok", "regime": regime}
 
 
-def empty_row(case: Case, points: int) -> Row:
+def empty_row(case: Case, points: int) -> frame.Row:
     """Return a row without any known value."""
     lengths = {
         "revolution": points, "joint": len(JOINTS), "coordinate": len(COORDINATES),
-        "number": len(state_names(record(case))),
+        "number": len(physics.state_names(solve.record(case))),
     }  # fmt: skip
     numbers = {
         name: np.full([lengths[dim] for dim in dims], math.nan)
@@ -167,7 +151,7 @@ def empty_row(case: Case, points: int) -> Row:
     return dict.fromkeys(TEXTS, "") | numbers
 
 
-def failed_row(row: Row, run: RevolutionRun) -> Row:
+def failed_row(row: frame.Row, run: RevolutionRun) -> frame.Row:
     """Return a row of a value whose run stopped."""
     return row | {"status": "failed", "reason": str(run.reason), "detail": run.detail}
 
@@ -180,15 +164,15 @@ def settle_motion(
     Return the run, and the revolution from which on they agree, nan if they do not in
     `SETTLE_REV`.
     """
-    p, within = record(case), least_promise(case)
-    each: list[Metrics] = []
+    p, within = solve.record(case), solve.least_promise(case)
+    each: list[solve.Metrics] = []
 
     def enough(turns: list[np.record], points: np.ndarray) -> bool:
-        each[len(turns) - 1 :] = [metrics(p, turns[-1])]  # a run made again begins anew
-        return steady(each, within) is not None
+        each[len(turns) - 1 :] = [solve.metrics(p, turns[-1])]  # a run made again begins anew
+        return solve.steady(each, within) is not None
 
     found = follow_revolutions(case, state, SETTLE_REV, deadline, enough)
-    agreed = steady([metrics(p, turn) for turn in found.turns], within)
+    agreed = solve.steady([solve.metrics(p, turn) for turn in found.turns], within)
     return found, float(agreed[0]) if agreed else math.nan
 
 
@@ -204,20 +188,20 @@ def follow_revolutions(
     A run whose energy does not balance is made again at tenths of its tolerance.
     """
     bare, rtol = bare_case(case, most), case.rtol
-    p, ends = record(bare), revolutions(0.0, bare.duration, bare.turn)
+    p, ends = solve.record(bare), solve.revolutions(0.0, bare.duration, bare.turn)
 
-    def is_enough(run: Trajectory) -> bool:
+    def is_enough(run: solve.Trajectory) -> bool:
         return enough(run.turns, poincare_points(p, run.turn_states))
 
     for failures in itertools.count(1):
         left = max(deadline - time.monotonic(), 0.0)
-        run = run_at_tolerance(bare, rtol, left, False, state, ends, is_enough)
+        run = solve.run_at_tolerance(bare, rtol, left, False, state, ends, is_enough)
         trajectory = run.trajectory
-        residual = energy_residual(trajectory.tally)
-        allowed = allowed_residual(case.rtol, len(trajectory.turns))
+        residual = solve.energy_residual(trajectory.tally)
+        allowed = solve.allowed_residual(case.rtol, len(trajectory.turns))
         if run.reason or residual <= allowed:
             break
-        tighter = next_audit_rtol(rtol, failures)
+        tighter = solve.next_audit_rtol(rtol, failures)
         if tighter is None:
             run.reason = Reason.ENERGY_AUDIT_FAILED
             text = f"energy residual {residual:.2g}, more than {allowed:.2g}, at rtol {rtol:.2g}"
@@ -232,9 +216,9 @@ def follow_revolutions(
 
 def bare_case(case: Case, count: int) -> Case:
     """Return a case over `count` revolutions, all measured, without any other output."""
-    whole = with_settle_rev(case, 0.0, 1, float(count))
-    solve = replace(whole.solve, error_bars=False, accuracy="standard", horizon=False)
-    return replace(whole, solve=solve, output=Output(signals=False))
+    whole = solve.with_settle_rev(case, 0.0, 1, float(count))
+    settings = replace(whole.solve, error_bars=False, accuracy="standard", horizon=False)
+    return replace(whole, solve=settings, output=cases.Output(signals=False))
 
 
 def poincare_points(p: np.record, states: list[np.ndarray]) -> np.ndarray:
@@ -279,7 +263,7 @@ def period_of(found: np.ndarray, within: float) -> int | None:
         last = end - (end - k) % period  # a slow drift does not add up to a period
         return bool(distances(found[[k]], found[[last]]).item() <= within)
 
-    repetition = find_repetition(len(found), MAX_PERIOD, is_same, more=MORE)
+    repetition = solve.find_repetition(len(found), MAX_PERIOD, is_same, more=MORE)
     return repetition[1] if repetition else None
 
 
@@ -295,7 +279,7 @@ def hausdorff_distance(one: np.ndarray, other: np.ndarray) -> float:
     return float(max(matrix.min(axis=1).max(), matrix.min(axis=0).max()))
 
 
-def differ(case: Case, one: Row, other: Row) -> bool:
+def differ(case: Case, one: frame.Row, other: frame.Row) -> bool:
     """Return whether the motions of two rows of a case are different ones.
 
     Two periodic motions differ if their sets of Poincaré places are farther apart than three times
@@ -304,7 +288,7 @@ def differ(case: Case, one: Row, other: Row) -> bool:
     are more than 3 standard errors of their difference apart. Other motions are not known well
     enough to differ.
     """
-    regimes, clearance = {one["regime"], other["regime"]}, record(case)["clearance"]
+    regimes, clearance = {one["regime"], other["regime"]}, solve.record(case)["clearance"]
     if regimes == {Regime.PERIODIC}:
         sets = [places(row["section"][: int(row["period"])], clearance) for row in (one, other)]
         return hausdorff_distance(*sets) > APART_TOLERANCES * tolerance(case)

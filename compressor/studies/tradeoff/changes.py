@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from compressor.digits import align_columns, by_bar, is_known
+from compressor import digits, report
 from compressor.metrics import BARRED
 from compressor.outcome import Regime
-from compressor.report import Measure, measures
 
 NONE_SEEN = "none seen"  # less than both error bars
 NO_VALUE = "–"
@@ -45,7 +44,7 @@ class ModelTable:
     the case has no number of.
     """
 
-    measures: tuple[Measure, ...]
+    measures: tuple[report.Measure, ...]
     values: tuple[float, ...]
     bars: tuple[float, ...]
     rows: tuple[ModelRow, ...]
@@ -63,7 +62,7 @@ def model_table(data: xr.Dataset) -> ModelTable:
     Counts, which depend on how long a run is, are left out.
     """
     first = data.isel(choice=0)
-    shown = [m for m in measures(first) if BARRED[m.variable].kind != "count"]
+    shown = [m for m in report.measures(first) if BARRED[m.variable].kind != "count"]
     known = [m for m in shown if has_number(m, float(m.of(first)), float(m.bar(first)))]
     columns = [(m, m.of(data), m.bar(data)) for m in known]
     rows = []
@@ -88,14 +87,14 @@ def model_table(data: xr.Dataset) -> ModelTable:
     )  # fmt: skip
 
 
-def has_number(measure: Measure, value: float, bar: float) -> bool:
+def has_number(measure: report.Measure, value: float, bar: float) -> bool:
     """Return whether a case knows a measure so well that others can be compared with it."""
-    known = is_known(value, bar, measure.is_relative)
+    known = digits.is_known(value, bar, measure.is_relative)
     return known and (value > 0.0 or not measure.is_relative)
 
 
 def change(
-    measure: Measure, values: np.ndarray, bars: np.ndarray, choice: xr.Dataset
+    measure: report.Measure, values: np.ndarray, bars: np.ndarray, choice: xr.Dataset
 ) -> tuple[str, float]:
     """Return the change of a measure by a choice, in words and as a number, nan where unknown.
 
@@ -104,7 +103,7 @@ def change(
     status, relative = str(choice["status"].item()), measure.is_relative
     if status != "ok" or math.isnan(values[1]):
         return ("failed" if status == "failed" else NO_VALUE), math.nan
-    if not is_known(values[1], bars[1], relative):
+    if not digits.is_known(values[1], bars[1], relative):
         chaotic = str(choice["regime"].item()) == Regime.CHAOTIC
         return ("chaotic" if chaotic else "unknown"), math.nan
     if relative and values[1] <= 0.0:  # a penetration
@@ -116,7 +115,7 @@ def change(
     return change_text(measure, size), size
 
 
-def change_text(measure: Measure, size: float) -> str:
+def change_text(measure: report.Measure, size: float) -> str:
     """Return a change in percent; of a share +3.1 points, of an angle +3.1 °."""
     if measure.is_relative:
         return percent(size, "+")
@@ -135,12 +134,12 @@ def list_changes(table: ModelTable) -> Iterator[str]:
     rows, still = [], []
     for n, (m, value, bar) in enumerate(zip(table.measures, table.values, table.bars, strict=True)):
         most = table.rank_rows(n)
-        number = f"{by_bar(value, bar, m.is_relative, bare=True)} {m.unit}".rstrip()
+        number = f"{digits.by_bar(value, bar, m.is_relative, bare=True)} {m.unit}".rstrip()
         rows += [(m.title, number)] if most else []
         rows += [(f"  {row.name}", row.cells[n]) for row in most[:MOST_SHOWN]]
         still += [] if most else [m.title]
-    yield from align_columns(rows, "<>")
+    yield from digits.align_columns(rows, "<>")
     yield f"nothing is seen to move: {'; '.join(still) or NO_VALUE}"
     yield f"not known of the case itself: {'; '.join(table.unknown) or NO_VALUE}"
     notes = {row.varied or row.name: row.note for row in table.rows if row.note}
-    yield from align_columns([("assumed, or why there is no number:", ""), *notes.items()])
+    yield from digits.align_columns([("assumed, or why there is no number:", ""), *notes.items()])

@@ -9,7 +9,8 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import Any
 
-from compressor.cases import ACCURACY, Case, Study, points
+from compressor import cases
+from compressor.cases import Case, Study
 from compressor.digits import align_columns, plural
 from compressor.program import Progress, duration
 from compressor.studies.tradeoff import changes, variants
@@ -33,7 +34,7 @@ def explain(study: Study, job: int, workers: int, progress: Progress) -> dict[st
     return {
         "study": study.name,
         "jobs": study.jobs,
-        "point": next(islice(points(study), job, None)),
+        "point": next(islice(cases.points(study), job, None)),
         "rtol": case.rtol,
         "promise": promise(case),
         "method": case.solve.method,
@@ -83,8 +84,8 @@ def promise(case: Case) -> float:
     """
     if case.targets:
         return min(target for _, target in case.targets)
-    promises = [tier.promise for tier in ACCURACY.values() if case.rtol <= tier.rtol]
-    return min(promises, default=ACCURACY["draft"].promise)
+    promises = [tier.promise for tier in cases.ACCURACY.values() if case.rtol <= tier.rtol]
+    return min(promises, default=cases.ACCURACY["draft"].promise)
 
 
 # ---- as text ------------------------------------------------------------------------------------

@@ -15,30 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from compressor.cases import (
-    CONTACT_LAWS,
-    CYLINDRICAL,
-    FOLLOWING,
-    FRICTION_LAWS,
-    PLAUSIBLE,
-    Case,
-    CaseError,
-    Output,
-    Study,
-    keys_of,
-    paper_notes,
-    path_of,
-    put,
-    reads,
-    stands_for,
-    value_of,
-    values_given,
-)
-from compressor.metrics import BARRED, JOINTS, METRICS
-from compressor.program import Progress, no_progress, report_progress
-from compressor.solve import simulate, stiffness_of
-from compressor.store import Folder, read_store
-from compressor.sweep import compile_once, needed_parts
+from compressor import cases, metrics, program, solve, store, sweep
+from compressor.cases import Case, Study
+from compressor.metrics import JOINTS
 
 ITSELF = "the case itself"
 MAX_SECONDS = 30.0  # of a variant
@@ -56,7 +35,10 @@ OWN_CORNERS = (
 )
 WORDS = ("status", "reason", "regime", "seconds")
 # of every run, and what else is shown of it: rod load, body and sensor
-COMPARED = (*METRICS, *(name for name, row in BARRED.items() if row.shown and name not in METRICS))
+COMPARED = (
+    *metrics.METRICS,
+    *(name for name, row in metrics.BARRED.items() if row.shown and name not in metrics.METRICS),
+)
 
 Values = Mapping[str, Any]  # of a case file, by dotted key
 OfCase = Values | Callable[[Case], Values | None] | None  # None: not for this case
@@ -71,7 +53,7 @@ def change(case: Case, values: Values) -> Case:
     """Return a case with other values. Raises CaseError where there is no such case."""
     nested = case.values()
     for key, value in values.items():
-        nested = put(nested, path_of(key), value)
+        nested = cases.put(nested, cases.path_of(key), value)
     return Case.resolve(nested)
 
 
@@ -94,7 +76,7 @@ def contact_values(law: str, case: Case) -> Values | None:
     }
     if law not in UNDAMPED:
         values["contact.restitution"] = contact.restitution or RESTITUTION
-    if law in CYLINDRICAL:
+    if law in cases.CYLINDRICAL:
         length = contact.length_mm and vars(contact.length_mm)
         values["contact.length_mm"] = length or bearing_length(case)
         if not (contact.materials or contact.modulus_GPa):
@@ -176,9 +158,9 @@ class Feature(NamedTuple):
 
     def is_in(self, case: Case) -> bool:
         """Return whether a case has the feature, and so pays for it."""
-        value = case.load if self.key == "load" else value_of(case, self.key)
+        value = case.load if self.key == "load" else cases.value_of(case, self.key)
         has = value == self.word if self.word else value not in (None, False, 0, "none")
-        return has and reads(case, self.key)
+        return has and cases.reads(case, self.key)
 
 
 SPRING_DAMPING, GRAVITY = "spring.damping_N_s_per_mm", "machine.gravity_m_per_s2"
@@ -206,10 +188,10 @@ FEATURES = (
     Feature("speed that gives way", "drive", {"drive": True}, {"drive": None}, "steady speed"),
     *(Feature(f"contact law: {law}", "contact.law", partial(contact_values, law),
               partial(contact_values, "impact"), "contact law: impact", True, law)
-      for law in CONTACT_LAWS if law != "impact"),
+      for law in cases.CONTACT_LAWS if law != "impact"),
     *(Feature(f"friction law: {law}", "friction.law", partial(friction_values, law),
               {"friction.law": "adams"}, "friction law: adams", True, law)
-      for law in FRICTION_LAWS if law != "adams"),
+      for law in cases.FRICTION_LAWS if law != "adams"),
     Feature("play of the guide", "guide.clearance_mm", {"guide.clearance_mm": 0.05},
             {"guide.clearance_mm": 0}, "guide without play", True),
     Feature("oil film", "lubricant", oil_values, {"lubricant": None}, "dry joints", True),
@@ -265,7 +247,7 @@ def vary(case: Case, name: str, values: Values, note: str = "", **more: Any) -> 
     """Return a variant of a case by other values, with what it assumes, or why it cannot be."""
     try:
         other = change(case, values)
-    except CaseError as error:
+    except cases.CaseError as error:
         return Variant(name, None, f"cannot be: {error.problems[0]}", **more)
     return Variant(
         name, other, ", ".join(filter(None, [note, *list_assumed_values(case, other)])), **more
@@ -274,12 +256,12 @@ def vary(case: Case, name: str, values: Values, note: str = "", **more: Any) -> 
 
 def list_assumed_values(case: Case, other: Case) -> Iterator[str]:
     """Yield the values that the other case reads and the case has not, as `key value`."""
-    for key in keys_of(partial(value_of, other)):
-        value = value_of(other, key)
-        is_new = value != value_of(case, key) or not reads(case, key)
-        if value and not isinstance(value, str | bool) and is_new and reads(other, key):
+    for key in cases.keys_of(partial(cases.value_of, other)):
+        value = cases.value_of(other, key)
+        is_new = value != cases.value_of(case, key) or not cases.reads(case, key)
+        if value and not isinstance(value, str | bool) and is_new and cases.reads(other, key):
             whole, _, name = key.rpartition(".")
-            yield f"{key if stands_for(whole) else name} {format_value(value)}"
+            yield f"{key if cases.stands_for(whole) else name} {format_value(value)}"
 
 
 def format_value(value: Any) -> str:
@@ -298,7 +280,7 @@ def scale_contact(case: Case) -> Iterator[Variant]:
 
     With the stiffness of its pins too, and bearings as long as wide, where those are the paper's.
     """
-    contact, notes = case.contact, paper_notes(case)
+    contact, notes = case.contact, cases.paper_notes(case)
     if faulty(case):
         for words, factor in SCALES.items():
             values, note = scaled_stiffness(case, factor)
@@ -332,14 +314,16 @@ def scaled_stiffness(case: Case, factor: float) -> tuple[Values, str]:
     """
     contact, worn = case.contact, faulty(case)
     values: dict[str, Any] = {"contact.materials": None}
-    if contact.law in CYLINDRICAL:
+    if contact.law in cases.CYLINDRICAL:
         key, unit = "contact.modulus_GPa", 1e9
         lines = change(case, {"contact.law": "johnson"})  # whose stiffness is pi E* L
-        each = [stiffness_of(lines, j) / (math.pi * contact.length_mm.at(j) / 1e3) for j in worn]  # type: ignore[union-attr]
+        length = contact.length_mm
+        assert length
+        each = [solve.stiffness_of(lines, j) / (math.pi * length.at(j) / 1e3) for j in worn]
         each = [contact.modulus_GPa * unit] if contact.modulus_GPa else each
     else:
         key, unit, values["contact.geometry"] = SCALED[0], 1000.0**contact.exponent, None
-        each = [stiffness_of(case, joint) for joint in worn]
+        each = [solve.stiffness_of(case, joint) for joint in worn]
     values[key] = factor * (math.prod(each) ** (1.0 / len(each)) / unit)
     return values, "" if max(each) <= SAME_STIFFNESS * min(each) else "of both joints"
 
@@ -354,15 +338,15 @@ def vary_numbers(study: Study, job: int) -> Iterator[Variant]:
     sweeps is not varied, nor is the paper's cylinder with the corners that the paper prints of it.
     """
     case, nested = study.cases[job], study.given(job)
-    given, swept = values_given(nested), {axis.key for axis in study.axes}
-    for key in keys_of(partial(value_of, case)):
+    given, swept = cases.values_given(nested), {axis.key for axis in study.axes}
+    for key in cases.keys_of(partial(cases.value_of, case)):
         whole = key.rpartition(".")[0]
-        names = {key, *stands_for(key)} | ({whole} if stands_for(whole) else set())
-        doubt = PLAUSIBLE.get(key) or PLAUSIBLE.get(whole)
-        if doubt is None or key in SCALED or not reads(case, key) or names & swept:
+        names = {key, *cases.stands_for(key)} | ({whole} if cases.stands_for(whole) else set())
+        doubt = cases.PLAUSIBLE.get(key) or cases.PLAUSIBLE.get(whole)
+        if doubt is None or key in SCALED or not cases.reads(case, key) or names & swept:
             continue
         is_given = not names.isdisjoint(given)
-        value = value_of(nested if is_given else case, key)
+        value = cases.value_of(nested if is_given else case, key)
         span = doubt.given if is_given else doubt.left_out
         if span is None or value is None:
             continue
@@ -372,22 +356,23 @@ def vary_numbers(study: Study, job: int) -> Iterator[Variant]:
                 yield Variant(key, None, OWN_CORNERS, key)
                 continue
             # which follow from what else is given of a cylinder, and are to stay
-            held = {key.removeprefix("gas."): value_of(case, key) for key in FOLLOWING}
+            held = {key.removeprefix("gas."): cases.value_of(case, key) for key in cases.FOLLOWING}
             base = nested | {"gas": held | nested.get("gas", {})}
-        if stands_for(whole) and not is_given:  # the other parts stay
-            base = put(base, path_of(whole), value)
+        if cases.stands_for(whole) and not is_given:  # the other parts stay
+            base = cases.put(base, cases.path_of(whole), value)
         for end in span.ends(value):
             label = f"{key} {end:.4g}"
             try:
-                yield Variant(label, Case.resolve(put(base, path_of(key), end)), doubt.why, key)
-            except CaseError as error:
+                other = Case.resolve(cases.put(base, cases.path_of(key), end))
+                yield Variant(label, other, doubt.why, key)
+            except cases.CaseError as error:
                 yield Variant(label, None, f"cannot be: {error.problems[0]}", key)
 
 
 # ---- runs ---------------------------------------------------------------------------------------
 
 
-def choose_job(study: Study, folder: Folder) -> tuple[int, str]:
+def choose_job(study: Study, folder: store.Folder) -> tuple[int, str]:
     """Return the number of the job of a study that matters most, and why that one.
 
     It is the one with the greatest known force on a joint of those stored in a folder of results;
@@ -395,7 +380,7 @@ def choose_job(study: Study, folder: Folder) -> tuple[int, str]:
     """
     if study.jobs == 1:
         return 0, "the job"
-    stored = read_store(folder)
+    stored = store.read_store(folder)
     positions = stored.find(study.keys)
     there = np.flatnonzero(positions >= 0)
     if there.size:
@@ -412,7 +397,9 @@ def choose_job(study: Study, folder: Folder) -> tuple[int, str]:
     return int(np.argmax(gaps)), f"{why}is stored"
 
 
-def explain_models(study: Study, job: int, progress: Progress = no_progress) -> xr.Dataset:
+def explain_models(
+    study: Study, job: int, progress: program.Progress = program.no_progress
+) -> xr.Dataset:
     """Run a job of a study, with every number in doubt, and by every other model of its machine.
 
     Returns the Dataset of `run_variants`.
@@ -422,7 +409,7 @@ def explain_models(study: Study, job: int, progress: Progress = no_progress) -> 
 
 
 def run_variants(
-    case: Case, others: Iterable[Variant], progress: Progress = no_progress
+    case: Case, others: Iterable[Variant], progress: program.Progress = program.no_progress
 ) -> xr.Dataset:
     """Run a case and its variants; return their metrics with error bars, dim `choice`, in SI.
 
@@ -432,20 +419,20 @@ def run_variants(
     """
     every = [Variant(ITSELF, case), *others]
     # each variant has little time, which compiling its equations would use up
-    parts = needed_parts([one.case for one in every if one.case])
-    compile_once(parts, lambda remark: progress(0, len(every), remark))
+    parts = sweep.needed_parts([one.case for one in every if one.case])
+    sweep.compile_once(parts, lambda remark: progress(0, len(every), remark))
     runs: list[xr.Dataset] = []
     names = [name + end for name in COMPARED for end in ("", "_error")]
-    for one in report_progress(every, progress):
+    for one in program.report_progress(every, progress):
         if one.case is None:
             runs.append(without_numbers(runs[0]))
             continue
         # the first run of the case itself may load compiled code
         limit, least = (MAX_SECONDS, 1) if runs else (math.inf, 2)
         seconds = min(one.case.solve.timeout_s, limit)
-        solve = replace(one.case.solve, error_bars=True, timeout_s=seconds)
-        output = Output("metrics", signals=one.case.output.signals)
-        run, _ = run_fastest(replace(one.case, wear=None, output=output, solve=solve), least)
+        settings = replace(one.case.solve, error_bars=True, timeout_s=seconds)
+        output = cases.Output("metrics", signals=one.case.output.signals)
+        run, _ = run_fastest(replace(one.case, wear=None, output=output, solve=settings), least)
         runs.append(run[[*WORDS, *(name for name in names if name in run)]])
         if runs[0]["status"] != "ok":
             break
@@ -468,7 +455,7 @@ def run_fastest(case: Case, least: int) -> tuple[xr.Dataset, float]:
     runs: list[tuple[xr.Dataset, float]] = []
     while len(runs) < least or (len(runs) < REPEATS and runs[-1][0]["seconds"] < SLOW_SECONDS):
         began = time.perf_counter()
-        run = simulate(case)
+        run = solve.simulate(case)
         runs.append((run, time.perf_counter() - began))
         if run["status"] != "ok":
             break

@@ -12,20 +12,21 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.cases import ACCURACY, METHODS, Study, load_studies, points
+from compressor import cases, report, store, sweep
+from compressor.cases import Study
 from compressor.digits import align_columns
-from compressor.report import Panel, PlotlyFigure, make_grid, rectangle, style
-from compressor.store import Folder, read_job, read_store
+from compressor.report import style
 from compressor.studies import frame
-from compressor.sweep import Options, sweep
 
 ENDING = "-tradeoff"  # of the study's name
 REFERENCES = ("DOP853", "RODAS")  # SciPy's explicit one, our implicit one that lands on onsets
 # those behind the words of `accuracy`, some between, and that of the truth
-TOLERANCES = sorted({tier.rtol for tier in ACCURACY.values()} | {1e-3, 2e-4, 1e-6, 1e-12})[::-1]
+TOLERANCES = sorted(
+    {tier.rtol for tier in cases.ACCURACY.values()} | {1e-3, 2e-4, 1e-6, 1e-12}, reverse=True
+)
 # in place of what the file gives, but not of --set; auto steps by TSIT5
 SETTINGS = (
-    f"solve.method=[{', '.join(method for method in METHODS if method != 'TSIT5')}]",
+    f"solve.method=[{', '.join(method for method in cases.METHODS if method != 'TSIT5')}]",
     f"solve.rtol=[{', '.join(map(repr, TOLERANCES))}]",
     "solve.error_bars=false", "solve.horizon=false", "solve.timeout_s=4", "output.keep=series",
 )  # fmt: skip
@@ -40,14 +41,16 @@ VARIABLES = {  # of a point -> attributes
 }
 
 
-def load_methods(path: str, overrides: Sequence[str], folder: Folder) -> tuple[Study, list[str]]:
+def load_methods(
+    path: str, overrides: Sequence[str], folder: store.Folder
+) -> tuple[Study, list[str]]:
     """Return the study of a case file by methods and tolerances, and what it sets in the file.
 
     Where the file lets a run find its own length, it is run, and all methods get the longest one.
     Raises StudyError and CaseFileError.
     """
     of_file = frame.without_keys(overrides, ["solve.method", "solve.rtol"])
-    (own,) = load_studies(path, overrides=of_file)
+    (own,) = cases.load_studies(path, overrides=of_file)
     if not all(any(vars(case.clearance_mm).values()) for case in own.cases):
         raise frame.StudyError(
             f"{path}: a job of {own.name} has no joint with clearance, so nothing is integrated: "
@@ -56,22 +59,22 @@ def load_methods(path: str, overrides: Sequence[str], folder: Folder) -> tuple[S
     settings = [f"name={own.name[: frame.MAX_NAME - len(ENDING)]}{ENDING}", *SETTINGS]
     given = [case.solve.duration_rev for case in own.cases]
     if "auto" in [*given, *(case.solve.settle_rev for case in own.cases)]:
-        sweep([own], folder, 1, options=Options(overrides=of_file))
-        runs = [(case, read_job(folder, case.key)) for case in own.cases]
+        sweep.sweep([own], folder, 1, options=sweep.Options(overrides=of_file))
+        runs = [(case, store.read_job(folder, case.key)) for case in own.cases]
         settle = max(round(run.attrs.get("settle", 0.0) / case.turn, 6) for case, run in runs)
         duration = max(settle + SETTLED_REV, *(one for one in given if isinstance(one, float)), 0.0)
         settings += [f"solve.duration_rev={duration!r}", f"solve.settle_rev={settle!r}"]
         overrides = frame.without_keys(overrides, ["solve.duration_rev", "solve.settle_rev"])
     texts = frame.replace_settings(settings, *overrides)
-    (study,) = load_studies(path, overrides=texts)
+    (study,) = cases.load_studies(path, overrides=texts)
     return study, texts
 
 
-def work_precision(folder: Folder, study: Study) -> xr.Dataset:
+def work_precision(folder: store.Folder, study: Study) -> xr.Dataset:
     """Return the errors and times of a stored study's jobs, as `tabulate` has them."""
-    stored = read_store(folder)
+    stored = store.read_store(folder)
     rows: list[dict[str, Any]] = []
-    for key, case, point in zip(study.keys, study.cases, points(study), strict=True):
+    for key, case, point in zip(study.keys, study.cases, cases.points(study), strict=True):
         scene = " ".join(f"{value}" for name, value in point.items() if "solve." not in name)
         row: dict[str, Any] = {"scene": scene or study.name.removesuffix(ENDING)}
         row |= {"method": case.solve.method, "rtol": case.rtol}
@@ -177,7 +180,7 @@ TIER = style.mark(style.BLUE, "circle", 9.5, 4, is_hollow=True)
 DISAGREE = style.fill("#f0f0f0", zorder=0, edge="#c9c9c9", is_hatched=True)
 
 
-def draw_work_precision(study: xr.Dataset) -> PlotlyFigure:
+def draw_work_precision(study: xr.Dataset) -> report.PlotlyFigure:
     """Return a panel a scene: error of acceleration over wall time, a line a method.
 
     Rings mark the tolerances behind the words of `accuracy`; in the hatched band the references
@@ -185,7 +188,7 @@ def draw_work_precision(study: xr.Dataset) -> PlotlyFigure:
     """
     count = study.sizes["scene"]
     rows = -(-count // COLUMNS)
-    drawing, _ = make_grid(rows, min(COLUMNS, count), 4.1 * rows + 0.7, count,
+    drawing, _ = report.make_grid(rows, min(COLUMNS, count), 4.1 * rows + 0.7, count,
                            share_x="all", share_y="all")  # fmt: skip
     for number, panel in enumerate(drawing.panels):
         one = study.isel(scene=number)
@@ -201,13 +204,13 @@ def draw_work_precision(study: xr.Dataset) -> PlotlyFigure:
     for number, panel in enumerate(drawing.panels):
         apart = study["reference_uncertainty"].values[number].item()
         if apart > ends[0]:
-            panel.fill(*rectangle(np.array(sides), np.array([ends[0], apart])), DISAGREE)
+            panel.fill(*report.rectangle(np.array(sides), np.array([ends[0], apart])), DISAGREE)
     drawing.list_line("a word of solve.accuracy", TIER)
     drawing.list_area("the references disagree", DISAGREE)
     return drawing.figure()
 
 
-def draw_scene(panel: Panel, one: xr.Dataset) -> None:
+def draw_scene(panel: report.Panel, one: xr.Dataset) -> None:
     """Draw a line a method, and a ring and the word where a tolerance of `auto` has one."""
     for name in one["method"].values:
         color, dash, width, zorder, marker, label = LOOKS.get(str(name), OTHER)
@@ -215,7 +218,7 @@ def draw_scene(panel: Panel, one: xr.Dataset) -> None:
         row = one.sel({"method": name})
         seconds = row["seconds"].where(row["error_acceleration"].notnull()).values
         panel.plot(seconds, row["error_acceleration"].values, line, label or str(name))
-    for word, tier in ACCURACY.items():
+    for word, tier in cases.ACCURACY.items():
         if "auto" in one["method"].values and tier.rtol in one["rtol"].values:
             point = one.sel({"method": "auto", "rtol": tier.rtol})
             x, y = point["seconds"].item(), point["error_acceleration"].item()

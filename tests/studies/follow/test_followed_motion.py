@@ -131,7 +131,7 @@ def test_a_value_begins_at_the_state_that_it_is_given(row):
 def test_a_settling_run_that_is_made_again_counts_its_own_revolutions(monkeypatch, row):
     """With those of the run whose energy did not balance it ended after one, settled nowhere."""
     residuals = iter([1.0])
-    monkeypatch.setattr(motion, "energy_residual", lambda tally: next(residuals, 0.0))
+    monkeypatch.setattr("compressor.solve.energy_residual", lambda tally: next(residuals, 0.0))
     settled, since = settle_motion(BIG_END, row["end_state"], soon())
     assert (len(settled.turns), since) == (3, 0)
 
