@@ -3,8 +3,8 @@ PYTHON ?= python3
 BIN := .venv/bin
 CAMPAIGN := PYTHONPATH=tests $(BIN)/python tests/campaigns
 STAMP := .venv/installed
-PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
-  runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
+PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py tally.py steppers.py) \
+  tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
 .PHONY: help install run figures test test-bare test-oldest test-pure check format calibration accuracy validation claims page sweep-bench peers tradeoff chaotic identify nameplate stress chaos mutants measurements pages docs release lock clean
 

@@ -25,20 +25,22 @@ from result_pages import keep, provenance, run_campaign
 COPIED = ("compressor", "cmd", "tests", "configs", "pyproject.toml", "README.md", "Makefile")
 DRAWN = 60
 # the order in which tests are tried, but for a file's own, which come first
-PURE = ("kinematics", "contact", "loads", "observe", "cam", "tally", "onset", "step_control",
-        "runge_kutta", "rosenbrock", "case", "integrate", "motion", "march",
+PURE = ("kinematics", "contact", "loads", "cam", "tally", "onset", "step_control",
+        "steppers", "case", "integrate", "motion", "march",
         "general_mechanism")  # fmt: skip
-COMPILED = ("invariances", "march", "integrate", "rosenbrock", "simulate", "accuracy",
+COMPILED = ("invariances", "march", "integrate", "steppers", "simulate", "accuracy",
             "regime")  # fmt: skip
 LAWS = ("contact_laws", "friction_laws", "chosen_laws")
 TESTED_IN = {
-    "mechanism": ("general_mechanism", "linear_systems"),
+    "mechanism": ("general_mechanism", "steppers"),
     "mechanism_rows": ("general_mechanism", "feature_runs"),
     "march": ("march", "wear_stages"),
     "motion": ("motion", *LAWS),
     "contact": ("contact", *LAWS),
-    "loads": ("loads", "card_curve", "card"),
-    "rosenbrock": ("rosenbrock", "linear_systems"),
+    "loads": ("loads", "card"),
+    "observe": ("motion", "general_mechanism"),
+    "rosenbrock": ("steppers",),
+    "runge_kutta": ("steppers",),
 }  # where not in the module of the same name alone
 OPTIONS = (
     "-o addopts= -x -v --tb=no --hypothesis-seed=0 "

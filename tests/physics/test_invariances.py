@@ -6,7 +6,6 @@ but a number (gravity, back pressure, the spring's damping) is off at its neutra
 """
 
 import itertools
-import math
 
 import numpy as np
 import pytest
@@ -25,7 +24,6 @@ from compressor.solve.request import Request
 from compressor.solve.run import integrate
 from compressor.solve.si_record import offsets, record, scene
 from compressor.solve.simulate import measure
-from compressor.store.reader import read_store
 from compressor.sweep.sweep import sweep
 
 pytestmark = pytest.mark.compiled
@@ -109,20 +107,6 @@ def test_a_mirrored_machine_moves_alike_to_the_bit(values, share):
     assert other.steps == found.steps
 
 
-@FEW
-@given(scenes(loads=st.just("none")), st.integers(0, 2**32), st.floats(0, 0.2))
-def test_a_mirrored_state_has_the_mirrored_rates(values, seed, t):
-    """With friction, within the rounding of the largest term: 1e-11 of the greatest rate."""
-    asked = request(values, 1e-6)
-    p, n = asked.p, asked.start.size // 2
-    y = random_state(values, n, seed)
-    found, other = np.empty(2 * n), np.empty(2 * n)
-    derivative(t, y, 0, p, found)
-    p.omega = -p.omega
-    derivative(t, mirrored(y), 0, p, other)
-    assert mirrored(other) == pytest.approx(found, rel=1e-11, abs=1e-11 * np.abs(found).max())
-
-
 # ---- units
 
 # exponents of length, mass and time; the contact stiffness has length ** (1 - p) as well
@@ -202,19 +186,6 @@ def test_units_touch_a_run_within_its_tolerance(values, a, b, c):
 
 
 @FEW
-@given(scenes(), st.integers(0, 2**32), st.floats(0, 1), st.integers(1, 1000))
-def test_a_state_has_the_same_rates_turns_later(values, seed, share, turns):
-    """But for the rounding of the crank angle, an epsilon of it: 1e-12 rad after 1000 turns."""
-    asked = request(values, 1e-6)
-    n, turn = asked.start.size // 2, 2 * math.pi / asked.p.omega
-    y = random_state(values, n, seed)
-    now, later = np.empty(2 * n), np.empty(2 * n)
-    derivative(share * turn, y, 1, asked.p, now)
-    derivative((share + turns) * turn, y, 1, asked.p, later)
-    assert later == pytest.approx(now, rel=1e-9, abs=1e-10 * np.abs(now).max())
-
-
-@FEW
 @given(scenes(friction=False))
 def test_a_run_goes_on_as_one_that_begins_a_turn_earlier(values):
     """Restarted from its state after a turn, but at time 0: within the errors of both."""
@@ -225,7 +196,7 @@ def test_a_run_goes_on_as_one_that_begins_a_turn_earlier(values):
     assert apart(accelerations(asked.p, integrate(again)), second) < BOUND
 
 
-# ---- workers, order and resuming
+# ---- workers and order
 
 SWEPT = {
     "joint": ["both", "big_end"], "clearance_mm": [0.1, 0.2], "load": ["spring", "none"],
@@ -233,44 +204,21 @@ SWEPT = {
 }  # fmt: skip
 
 
-def swept(folder, workers, backwards=False, interrupted=False):
-    """A digest of what a sweep stores of each job, timings apart; stopped once and gone on with."""
-    values = {key: v[::-1] if backwards and isinstance(v, list) else v for key, v in SWEPT.items()}
-    studies = load_studies(*write_cases(folder, one=values))
-
-    def stop(done, total, remark):
-        if done == 1:
-            raise KeyboardInterrupt
-
-    if interrupted:
-        with pytest.raises(KeyboardInterrupt):
-            sweep(studies, folder / "out", workers, stop)
-        assert 0 < len(read_store(folder / "out").keys()) < len(studies[0].cases)
-    sweep(studies, folder / "out", workers)
+def swept(folder, workers, values):
+    """A digest of what a sweep stores of each job, timings apart."""
+    sweep(load_studies(*write_cases(folder, one=values)), folder / "out", workers)
     return contents(folder / "out")
 
 
-def test_workers_order_and_resuming_change_no_bit(tmp_path):
-    others = {"two": swept(tmp_path / "two", 2)}
+def test_workers_and_order_change_no_bit(tmp_path):
+    backwards = {key: v[::-1] if isinstance(v, list) else v for key, v in SWEPT.items()}
     with jobs_here():
-        first = swept(tmp_path / "one", 1)
-        assert len(first) == 8
-        others["backwards"] = swept(tmp_path / "backwards", 1, backwards=True)
-        others["resumed"] = swept(tmp_path / "resumed", 1, interrupted=True)
-    for name, found in others.items():
-        assert found == first, name
+        first = swept(tmp_path / "one", 1, SWEPT)
+    assert len(first) == 8
+    assert swept(tmp_path / "two", 2, backwards) == first
 
 
-# ---- output, and features that are off
-
-
-@FEW
-@given(scenes(), st.integers(1, 700))
-def test_metrics_do_not_depend_on_the_output_grid(values, samples):
-    """To the bit: no step lands on a sample."""
-    one, other = (integrate(request(values, 1e-5, samples=count)) for count in (300, samples))
-    assert one.tally.tobytes() == other.tally.tobytes()
-    assert (one.steps, one.evaluations) == (other.steps, other.evaluations)
+# ---- features that are off
 
 
 @FEW
@@ -332,17 +280,6 @@ def test_a_clearance_that_vanishes_leaves_the_ideal_machine(values):
     assert slopes == pytest.approx(1.0, abs=0.1)
 
 
-@pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
-@pytest.mark.parametrize("clearance", [1e-6, 1.0])
-def test_a_nanometre_and_a_millimetre_pass_the_audit(joint, clearance):
-    """The paper's contact; in mm. At most ten tolerances a revolution are left of the energy."""
-    solve = {"duration_rev": 2, "error_bars": False}
-    case = Case.from_values({"joint": joint, "clearance_mm": clearance, "solve": solve})
-    found = measure(case)
-    assert (found.status, found.reason) == ("ok", "")
-    assert 0 < found.numbers["energy_residual"] < 10 * case.rtol * 2
-
-
 # ---- tolerance
 
 LADDER = [10.0**-k for k in range(3, 11)]
@@ -355,10 +292,9 @@ LADDER = [10.0**-k for k in range(3, 11)]
 )
 @pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
 def test_errors_are_proportional_to_the_tolerance(joint, more):
-    """Slope 0.75 to 1.25 of the error of acceleration over seven decades; no rung is twice as bad.
+    """Slope 0.75 to 1.25 of the error of acceleration over seven decades (0.79 as products round).
 
-    As the one before it: which of two is worse is now and then a matter of rounding. (The paper's
-    case with both joints has 0.79 or 0.81, as products are rounded.)
+    No rung is twice as bad as the one before: which of two is worse may be a matter of rounding.
     """
     values = {"joint": joint, "clearance_mm": 0.2, **more}
     asked = request(values, 1e-12)

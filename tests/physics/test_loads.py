@@ -1,4 +1,4 @@
-"""The loads: printed numbers, corners, continuity, and the segments they cut."""
+"""The loads: printed numbers, corners, continuity, the segments they cut, and measured cards."""
 
 import math
 
@@ -9,13 +9,15 @@ from cylinder_made import DOUBLE, MACHINE, pressures
 from compressor.cases.case import Case
 from compressor.physics.kinematics import exact_motion, ideal
 from compressor.physics.loads import (
+    card_force,
     greatest_load,
     piston_force,
     sample_segments,
     segments,
     static_load,
 )
-from compressor.solve.si_record import record
+from compressor.physics.record import CARD_NODES, new_record
+from compressor.solve.si_record import card_nodes, record
 
 EXACT = {"load": "gas", "gas": {"switching": "exact"}}
 GAS, SPRING = {"load": "gas"}, {"load": "spring"}
@@ -57,6 +59,7 @@ def test_corners(values, corners):
         (SPRING, 275.7392, 2, 3346.72),
         (SPRING, 300, 3, 3200),
         ({"load": "none"}, 50, 0, 0),
+        ({"load": "gas", "gas": {"back_pressure_MPa": 0.105}}, 100, 1, 0),  # on the other face
     ],
 )
 def test_ideal_force(values, degrees, phase, force):
@@ -75,11 +78,6 @@ def test_gas_is_continuous_at_exact_corners_only():
     assert 10 < jumps[1] < 100
 
 
-def test_back_pressure_acts_on_the_other_face():
-    p = record(Case.from_values({"load": "gas", "gas": {"back_pressure_MPa": 0.105}}))
-    assert ideal_force(p, 100, 1) == pytest.approx(0, abs=1e-9)
-
-
 def test_spring_follows_the_actual_motion():
     p = record(Case())
     rising = press(p, 1, 0.6, -1.0, 1e-4, 0.5) - press(p, 1, 0.6, -1.0)
@@ -95,9 +93,11 @@ def test_segments_cover_the_run_in_order():
     assert edges[0] == 0
     assert edges[-1] == 0.48
     assert (np.diff(edges) > 0).all()
-    assert np.degrees(p.omega * edges[:5]) == pytest.approx(
-        [0, 84.2608, 180, 275.7392, 360], abs=1e-4
-    )
+    turn = np.degrees(p.omega * edges[:5])
+    assert turn == pytest.approx([0, 84.2608, 180, 275.7392, 360], abs=1e-4)
+    times = np.array([0.0, 0.06, 0.12, 0.47, 0.48])  # a corner's phase is that which begins
+    assert phases[sample_segments(times, edges)].tolist() == [0, 2, 0, 3, 3]
+    assert segments(record(Case.from_values({"load": "none"})), 0.48)[0].tolist() == [0, 0.48]
 
 
 @pytest.mark.parametrize("stroke_mm", [60, 90, 120, 200])
@@ -108,16 +108,6 @@ def test_a_follower_of_any_stroke_dwells_for_it_each_way(stroke_mm):
     for phase, corner in enumerate([*np.degrees(p.corners), 360]):
         before, after = ideal_force(p, corner, phase), ideal_force(p, corner, (phase + 1) % 4)
         assert before == pytest.approx(after, abs=1e-8)
-
-
-def test_no_load_has_no_corners():
-    assert segments(record(Case.from_values({"load": "none"})), 0.48)[0].tolist() == [0, 0.48]
-
-
-def test_a_sample_on_a_corner_takes_the_phase_that_begins():
-    edges, phases = segments(record(Case()), 0.48)
-    times = np.array([0.0, 0.06, 0.12, 0.47, 0.48])
-    assert phases[sample_segments(times, edges)].tolist() == [0, 2, 0, 3, 3]
 
 
 @pytest.mark.parametrize(
@@ -179,18 +169,6 @@ def test_a_cylinder_is_continuous_at_its_corners():
         assert abs(change) < 1e-7
 
 
-@pytest.mark.parametrize("phase", range(4))
-def test_the_crank_end_mirrors_the_head_end(phase):
-    """The same faces, at a piston as far from the other cover; the force is the other way round."""
-    alike = {"back_pressure_MPa": 0, "clearance_percent": 13}
-    head, crank = cylinder(**HEAD_ALONE | alike), cylinder(**CRANK_ALONE | alike)
-    faces = (0.11**2 - 0.03**2) / 0.11**2
-    for x in (0.37, 0.45, 0.52):
-        one = press(head, phase + 4, 2 * 0.45 - x)
-        other = press(crank, 4 * phase + 1, x)
-        assert other == pytest.approx(-faces * one, rel=1e-13)
-
-
 def test_a_single_acting_cylinder_is_the_paper_s_gas_load():
     """With exact corners; all forces to rounding."""
     values = {"load": "gas", "gas": {"back_pressure_MPa": 0.05, "switching": "exact"}}
@@ -221,3 +199,29 @@ def test_the_greatest_load_of_a_cylinder(gas):
     most = max(abs(in_segments(p, degrees)) for degrees in np.linspace(0, 359.5, 720))
     assert most == pytest.approx(greatest_load(p), rel=1e-6)
     assert static_load(p) == greatest_load(p)
+
+
+# ---- a card's curve: Akima's, closed
+
+
+@pytest.mark.parametrize("count", [20, 97, 360])
+def test_a_card_s_curve_is_closed(count):
+    """A card that is measured from another angle on is the same curve, turned."""
+    rng = np.random.default_rng(count)
+    angles, values = np.sort(rng.uniform(0, 360, count)), rng.normal(size=count)
+    moved = np.argsort((angles + 90) % 360)
+    other = card_nodes(((angles + 90) % 360)[moved], values[moved])
+    found = card_nodes(angles, values)
+    np.testing.assert_allclose(other, np.roll(found, CARD_NODES // 4, axis=0), atol=1e-11)
+    assert np.abs(found[:, 0]).max() > 1.0
+
+
+def test_a_card_s_force_between_its_nodes():
+    """Of a smooth card, to the fourth order of the table's step; continuous over 0 and 360."""
+    p = new_record(featured=True)
+    step = 2 * math.pi / CARD_NODES
+    theta = step * np.arange(CARD_NODES)
+    p.card[:, 0], p.card[:, 1] = np.sin(3 * theta), 3 * step * np.cos(3 * theta)
+    for angle in np.linspace(-1, 13, 997):
+        found = card_force(math.cos(angle), math.sin(angle), p)
+        assert found == pytest.approx(math.sin(3 * angle), abs=81 * step**4 / 300)

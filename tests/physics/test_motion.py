@@ -1,4 +1,4 @@
-"""Equations of motion against an independent derivation: sympy's Lagrangian at 40 digits."""
+"""Equations of motion and forces by an independent derivation: SymPy's Lagrangian at 40 digits."""
 
 import math
 
@@ -9,8 +9,8 @@ import reference
 
 from compressor.cases.case import Case
 from compressor.physics.observe import COLUMNS, Column
-from compressor.physics.systems import derivative, observe_at
-from compressor.solve.si_record import record
+from compressor.physics.systems import derivative, observe_at, start
+from compressor.solve.si_record import offsets, record
 
 STATES = 400
 SCENES = ("big_end", "small_end", "both")
@@ -41,17 +41,8 @@ def random_case(scene, rng):
 def reference_params(case):
     """The same machine as `case` in the reference's words."""
     p = record(case)
-    changes = {
-        name: float(getattr(p, name))
-        for name in (
-            "omega",
-            "rod_mass",
-            "rod_centre",
-            "rod_inertia",
-            "reciprocating_mass",
-            "gravity",
-        )
-    }
+    names = ["omega", "rod_mass", "rod_centre", "rod_inertia", "reciprocating_mass", "gravity"]
+    changes = {name: float(getattr(p, name)) for name in names}
     clearance = dict(zip(reference.JOINTS, p.clearance.tolist(), strict=True))
     if not case.friction:
         changes |= {"mu_static": 0.0, "mu_dynamic": 0.0}
@@ -182,3 +173,36 @@ def test_a_nanometre_of_clearance_keeps_its_digits():
     found = row[Column.FORCE : Column.FORCE + 2]
     assert found == pytest.approx([float(f) for f in forces], rel=1e-12)
     assert rates[2:] == pytest.approx([float(e) for e in expected], rel=1e-12)
+
+
+def eccentricities(p, t, y):
+    """Of both journals, a row each, and the whole row."""
+    row = np.empty(COLUMNS)
+    observe_at(t, y, 1, p, row)
+    return row[Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(2, 2), row
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_eccentricity_matches_the_positions(scene):
+    """The difference identities against plain trigonometry of the positions."""
+    case = Case.from_values({"joint": scene, "clearance_mm": 0.2})
+    p, rng = record(case), np.random.default_rng(4)
+    for t in np.linspace(0.001, 0.11, 12):
+        found, row = eccentricities(p, t, random_state(scene, case, rng))
+        theta, phi = p.omega * t, row[Column.ROD_ANGLE]
+        pin = p.crank_radius * np.array([math.cos(theta), math.sin(theta)])
+        rod = p.rod_length * np.array([math.cos(phi), -math.sin(phi)])
+        crosshead = np.array([row[Column.DISPLACEMENT], 0.0])
+        # going round the loop: pin - e_big + rod + e_small = crosshead
+        assert pin - found[0] + rod + found[1] == pytest.approx(crosshead, abs=1e-14)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_initial_offset_shifts_the_journal(scene):
+    shift = {"big_end_x": 0.05, "big_end_y": -0.08, "small_end_x": 0.02, "small_end_y": 0.11}
+    values = {"joint": scene, "clearance_mm": 0.2, "initial_offset_mm": shift}
+    case = Case.resolve(values)
+    p, y = record(case), np.zeros(8 if scene == "both" else 4)
+    start(offsets(case), y, p)
+    expected = offsets(case) * (p.clearance[:, None] > 0)
+    assert eccentricities(p, 0.0, y)[0] == pytest.approx(expected, abs=1e-17)

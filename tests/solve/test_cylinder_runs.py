@@ -99,14 +99,6 @@ def test_the_force_of_a_worn_machine_has_kinks_and_no_steps(ends, oil):
     assert force == pytest.approx(pressing, abs=1e-9 * np.abs(force).max())
 
 
-def test_single_acting_with_exact_corners_is_the_plain_load():
-    plain = {"gas": {"switching": "exact"}, "machine": {}}
-    single = {"gas": {"action": "single", "back_pressure_MPa": 0}, "machine": {}}
-    ours, theirs = (run(one, rtol=1e-9) for one in (single, plain))
-    assert apart(ours, theirs) < 1e-9
-    assert apart(ours, theirs, "contact_force") < 1e-9
-
-
 CYCLE = ("suction_MPa", "discharge_MPa", "exponent", "clearance_percent", "valve_loss_percent")
 MEASURED = {key: value for key, value in DOUBLE.items() if key not in CYCLE}
 

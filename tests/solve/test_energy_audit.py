@@ -159,6 +159,8 @@ EXTREMES = {
     "rough": {"friction": {"static": 0.5, "dynamic": 0.4}},
     "light rod": {"machine": {"rod_mass_kg": 0.1, "reciprocating_mass_kg": 50}},
     "slow": {"machine": {"speed_rpm": 50}},
+    "nanometre": {"clearance_mm": 1e-6},
+    "millimetre": {"clearance_mm": 1.0},
 }
 
 

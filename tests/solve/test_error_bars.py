@@ -181,13 +181,14 @@ def test_where_explicit_steps_overrun_friction_the_stiff_partner_estimates_the_e
     assert error <= found.bars[name]
 
 
-def test_errors_do_not_depend_on_the_output_grid():
+def test_numbers_do_not_depend_on_the_output_grid():
+    """To the bit: no step lands on a sample."""
     found = [
         measure(Case.from_values({**BOTH, "solve": {**SHORT, **given}, "output": {"keep": keep}}))
         for given, keep in (({}, "series"), ({"output_step_deg": 7.2}, "series"), ({}, "metrics"))
     ]
     for other in found[1:]:
-        for name in ERRORS:
+        for name in (*METRICS, *ERRORS, "steps", "evaluations"):
             np.testing.assert_array_equal(found[0].numbers[name], other.numbers[name])
 
 
