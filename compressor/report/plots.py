@@ -199,7 +199,7 @@ def draw_study(stored: Stored, study: StoredStudy, choice: PlotChoice) -> Iterat
 
 def job_title(studies: Sequence[StoredStudy], key: str, what: str) -> str:
     """Return the title of a job's figure: its study, what is drawn, its place in the sweep."""
-    for study in studies:
+    for study in sorted(studies, key=lambda one: one.is_trial):  # a search may share the job
         if key in study.keys:
             point = [*points(study)][study.keys.index(key)]
             values = [f"{axis} {shown_value(value)}" for axis, value in point.items()]

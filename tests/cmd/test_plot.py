@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from compressor.analysis.shaking import frame_forces
 from compressor.cases.case import Case
 from compressor.report.figures import FIGURES
 from compressor.report.figures.table import spell
+from compressor.report.plots import job_title
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
@@ -127,6 +129,12 @@ def test_a_job_is_named_as_in_show(plot, folder, compsim, unpainted):
     code, found, err = plot(*words, "--what", "orbits")
     assert (code, [*found], err) == (0, [f"plots/{shown[:10]}-orbits.png"], "")
     assert shown == key(folder, "worn", 3)
+
+
+def test_a_job_is_titled_by_its_run_and_not_by_a_search(folder):
+    run = next(study for study in read_studies(folder) if study.name == "worn")
+    search = replace(run, name="a-search", command="compsim find worn.yaml")
+    assert job_title([search, run], run.keys[0], "orbits").startswith("worn: orbits")
 
 
 def test_a_study_is_drawn_along_an_axis(plot, folder, unpainted):
