@@ -33,12 +33,6 @@ def milliseconds(seconds):
     return f"{1e3 * seconds:.3g} ms" if seconds < 0.9995 else f"{1e3 * seconds:.0f} ms"
 
 
-def span(values, digits=2):
-    """The least and the greatest of some numbers, such as "19 to 24"."""
-    texts = [f"{float(f'{value:.{digits}g}'):g}" for value in (min(values), max(values))]
-    return texts[0] if texts[0] == texts[1] else " to ".join(texts)
-
-
 # ---- the ten findings: words, and of a campaign's numbers (measured, required, whether it passes)
 
 KEPT_PROMISES, WITHIN_BARS = 0.99, 0.95  # required; what the error bars are designed for
@@ -245,39 +239,18 @@ def parameter_tables():
     )
 
 
-def nameplate_films():
-    """Rows of the file of `compsim init machine` by the share in which the film gets no thinner."""
-    found = kept("nameplate.json")
-    return {0.02: found["rows"]} | {one["last_share"]: one["rows"] for one in found["films"]}
-
-
-def nameplate_table():
+def nameplate_table(found=None):
     """What the case file of `compsim init machine` gives over the small end's clearance."""
     rows = [
         [f"{row['clearance_mm']:g}", f"{row['peak_contact_force'] / 1e3:.3g}",
          f"{row['impacts_per_rev']:.3g}", f"{row['sensor_rms']:.2g}",
          f"{math.degrees(row['rod_load_reversal_angle']):.0f}",
          f"{1e3 * row['body_velocity_rms']:.2f}"]
-        for row in kept("nameplate.json")["rows"]
+        for row in (found or kept("nameplate.json"))["rows"]
     ]  # fmt: skip
     head = ["small end, mm", "peak force on it, kN", "dry contacts a revolution",
             "sensor, m/s² rms", "rod load reversal, °", "body along x, mm/s rms"]  # fmt: skip
     return markdown(head, rows)
-
-
-def film_words():
-    """How far the assumed share moves the answer: the spread of forces and of the sensor."""
-    every = [*zip(*nameplate_films().values(), strict=True)]
-
-    def spread(name):
-        ratios = [max(one[name] for one in each) / min(one[name] for one in each) for each in every]
-        return max(ratios), every[ratios.index(max(ratios))][0]["clearance_mm"]
-
-    (force, at), (sensor, loudest) = spread("peak_contact_force"), spread("sensor_rms")
-    return (
-        f"From {span(nameplate_films())} the peak force changes by {100 * force - 100:.2g} % at "
-        f"most (at {at:g} mm), the sensor's rms by a factor of {sensor:.2g} (at {loudest:g} mm).\n"
-    )
 
 
 def deciding_table():
@@ -339,11 +312,7 @@ PAGES = {  # page -> its generated blocks by name
         "stress-words": lambda: state("stress"),
     },
     "compressor/docs/diagnosis.md": {"identify-words": lambda: state("identify")},
-    "compressor/docs/my-machine.md": {
-        "nameplate": nameplate_table,
-        "films": film_words,
-        "decides": deciding_table,
-    },
+    "compressor/docs/my-machine.md": {"nameplate": nameplate_table, "decides": deciding_table},
     "compressor/docs/speed-or-accuracy.md": {"choose": choose_table},
     "compressor/docs/the-paper.md": {"paper": lambda: state("claims")},
 }

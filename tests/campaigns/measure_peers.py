@@ -179,7 +179,8 @@ def main(target):
     rows.sort(key=lambda row: (order.index(row["tool"]), SCENES.index(row["scene"])))
     kept = provenance("make peers")
     kept["versions"] |= versions()
-    kept |= {"rounds": ROUNDS, "agreement": checks, "rows": rows, "evaluations": evaluation.rows()}
+    timed_alone = {"scenes": [evaluation.beside_transcription(scene) for scene in SCENES]}
+    kept |= {"rounds": ROUNDS, "agreement": checks, "rows": rows, "evaluations": timed_alone}
     keep(target, kept, 3)
 
 

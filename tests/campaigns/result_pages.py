@@ -16,7 +16,15 @@ from importlib import metadata
 from itertools import groupby
 from pathlib import Path
 
-from page_tables import FINDINGS, RESULTS, kept, markdown, within_bars, write_blocks
+from page_tables import (
+    FINDINGS,
+    RESULTS,
+    kept,
+    markdown,
+    nameplate_table,
+    within_bars,
+    write_blocks,
+)
 
 
 def read_commit():
@@ -212,9 +220,9 @@ def peers(found):
             ("its wall time / our solver's", "kernel_wall_ratio", 2),
         )
     }  # fmt: skip
-    timed = found["evaluations"]
+    timed = found["evaluations"]["scenes"]
     return table(tools.values(), columns) + "\n" + table(
-        [*timed["scenes"], {"scene": "both, oil / dry", **timed["oil"]}],
+        timed,
         {"one evaluation": lambda row: row["scene"].replace("_", " "),
          "ours, ns": lambda row: number(1e9 * row["seconds"]),
          "the other, ns": lambda row: number(1e9 * row["other_seconds"]), "ratio": "ratio"},
@@ -332,12 +340,6 @@ def mutants(found):
     return markdown(["kind of bug", "bugs", "change no result", "caught", "not caught"], lines)
 
 
-def nameplate(found):
-    rows = [{"name": name, **row} for name, row in found["oils"].items()]
-    return table(rows, {"oil": "name", "peak force, N": "force:.3g",
-                        "error bar, N": "error:.2g", "motion": "regime"})  # fmt: skip
-
-
 # campaign: the question of its page in tests/results, and the table of what it found
 CAMPAIGNS = {
     "validation": ("Are published numbers reproduced?", validation),
@@ -353,7 +355,7 @@ CAMPAIGNS = {
     "mutants": ("Would the tests notice a bug?", mutants),
     "sweep": ("How many jobs a second, and does an interrupted sweep lose one?", sweep),
     "page": ("How fast is the report?", page),
-    "nameplate": ("What does the case file of `compsim init machine` give?", nameplate),
+    "nameplate": ("What does the case file of `compsim init machine` give?", nameplate_table),
 }  # fmt: skip
 
 # ---- pages

@@ -1,4 +1,4 @@
-"""One evaluation of the equations: ours beside the bare transcription, and with oil beside dry.
+"""One evaluation of the equations: ours beside the bare transcription.
 
 Both at the states of a run, in turn; times are medians of rounds. Ours is written into its caller
 and gives the state's rates, as in a step; the transcription gives the accelerations alone.
@@ -9,7 +9,6 @@ from functools import partial
 from statistics import median
 
 import numpy as np
-import yaml
 from numba import njit
 from peers.mechanism import (
     ACCELERATIONS,
@@ -17,7 +16,6 @@ from peers.mechanism import (
     GAS_EXPONENT,
     HEAD,
     OMEGA,
-    SCENES,
     SUCTION,
     A,
     L,
@@ -27,7 +25,6 @@ from peers.mechanism import (
 )
 
 from compressor.cases.case import Case
-from compressor.cases.examples import templates
 from compressor.physics._jit import jit
 from compressor.physics.kinematics import ideal
 from compressor.physics.loads import piston_place
@@ -37,7 +34,6 @@ from compressor.solve.solution import solve
 
 ROUNDS, CALLS = 31, 40_000
 HEAD_CLEARANCE = HEAD - L - R
-OILED_CLEARANCES = {"big_end": 0.1, "small_end": 0.2}  # mm
 
 
 @jit
@@ -117,42 +113,15 @@ def in_turn(one, other, count):
     return {"seconds": mine, "other_seconds": theirs, "ratio": median(a / b for a, b in pairs)}
 
 
-def our_calls(case):
-    """A call of ours at all states of a case's run, how many evaluations it makes, and the run."""
-    found = solve(case)
-    run = found.trajectory
-    repeats, out = CALLS // run.times.size + 1, np.empty(run.states.shape)
-    call = partial(ours, run.times, run.states, run.phases, found.p, out, repeats)
-    return call, repeats, found.p, run
-
-
 def beside_transcription(scene):
     """Our evaluation beside the bare one, and how far apart the crosshead's accelerations are."""
-    case = Case.from_values(case_values(scene, error_bars=False))
-    call, repeats, p, run = our_calls(case)
+    found = solve(Case.from_values(case_values(scene, error_bars=False)))
+    p, run = found.p, found.trajectory
+    m, repeats, out = run.times.size, CALLS // run.times.size + 1, np.empty(run.states.shape)
+    call = partial(ours, run.times, run.states, run.phases, p, out, repeats)
     y, (shut, still) = absolute_coordinates(scene, run.times, run.states), loads(run.phases)
-    bare, rows = np.empty((run.times.size, y.shape[1] // 2)), np.empty((run.times.size, COLUMNS))
+    bare, rows = np.empty((m, y.shape[1] // 2)), np.empty((m, COLUMNS))
     fill = partial(transcription(scene), run.times, y, shut, still, bare, repeats)
-    times = in_turn(call, fill, repeats * run.times.size)
+    times = in_turn(call, fill, repeats * m)
     observe_all(run.times, run.states, run.phases, p, rows)
     return {"scene": scene, **times, "apart": error(bare[:, 0], rows[:, Column.ACCELERATION])}
-
-
-def oiled_beside_dry():
-    """An evaluation of the machine of `compsim init machine` with oil at both pins, and without."""
-    values = yaml.safe_load(templates()["machine"].path.read_text())
-    wanted = {name: values[name] for name in ("joint", "machine", "load", "gas", "contact")}
-    wanted["clearance_mm"] = OILED_CLEARANCES
-    wanted["solve"] = {"duration_rev": 4, "settle_rev": 1, "error_bars": False}
-    oiled, repeats, _, run = our_calls(
-        Case.from_values({**wanted, "lubricant": values["lubricant"]})
-    )
-    dry, dry_repeats, _, dry_run = our_calls(Case.from_values(wanted))
-    assert repeats * run.times.size == dry_repeats * dry_run.times.size
-    return in_turn(oiled, dry, repeats * run.times.size)
-
-
-def rows():
-    """Times of evaluations: of each scene beside the transcription, and with oil beside dry."""
-    return {"scenes": [beside_transcription(scene) for scene in SCENES],
-            "oil": oiled_beside_dry()}  # fmt: skip
