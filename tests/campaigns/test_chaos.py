@@ -1,4 +1,4 @@
-"""`make chaos`: a sample of refused calls and power cuts, and what would be seen if it happened."""
+"""`make chaos`: a sample of full disks and power cuts, and what would be seen if it happened."""
 
 import faulthandler
 import os

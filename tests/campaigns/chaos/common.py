@@ -1,4 +1,9 @@
-"""What the campaigns share: small studies, forked processes, what a store holds, a tally."""
+"""What the campaigns share: small studies, forked processes, what a store holds.
+
+A campaign is a module with WHAT is tried and a function `trial(place, draw, number, counts)`. It
+does harm in an empty folder, draws at random how, and returns what went wrong, "" for nothing. What
+trials share is made once, beside that folder.
+"""
 
 import contextlib
 import faulthandler
@@ -6,15 +11,13 @@ import hashlib
 import itertools
 import json
 import multiprocessing
-import os
 import signal
 import subprocess
 import sys
 import tempfile
-import time
 import traceback
-from collections import Counter
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,7 +35,6 @@ SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides 
 FORK = multiprocessing.get_context("fork")
 SECONDS = 60.0  # in which a trial must end; what hangs takes for ever
 TIMED = "seconds"
-MASSES = [4 + n / 100 for n in range(24)]  # of rods, kg
 FOREIGN = ("case", "name")  # attributes that depend on which of several studies ran a job
 LEAN = {  # of a quick job
     "duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9,
@@ -49,29 +51,6 @@ STUDIES = {
         "output": {"keep": "metrics"},
     },
 }  # fmt: skip
-
-
-class Tally:
-    """What a campaign counts: trials, and short texts of those that failed."""
-
-    def __init__(self, what, seed, names=()):
-        self.what, self.seed, self.began = what, seed, time.monotonic()
-        self.trials, self.counts = 0, Counter(dict.fromkeys(names, 0))
-        self.failures = []
-
-    def note(self, trial, problem):
-        """Count a trial; note what went wrong, "" for nothing, with what repeats it."""
-        self.trials += 1
-        if problem:
-            self.failures.append(f"seed {self.seed}, {trial}: {problem[-1500:]}")
-
-    def result(self):
-        """The campaign's result."""
-        return {
-            "what": self.what, "trials": self.trials, "failed": len(self.failures),
-            "counts": dict(self.counts), "seconds": round(time.monotonic() - self.began, 1),
-            "failures": self.failures,
-        }  # fmt: skip
 
 
 # ---- case files and stores ----------------------------------------------------------------------
@@ -91,8 +70,12 @@ def rods_file(folder, name, masses, keep="metrics", **more):
     return case_file(folder, name, **rods, output={"keep": keep}, **more)
 
 
+@cache
 def complete_store(folder):
-    """A store with all jobs of `STUDIES`, and their case files; compiles what forks need."""
+    """A store with all jobs of `STUDIES`, their case files, and all that is stored.
+
+    It also compiles and imports what forks need.
+    """
     cases = [case_file(folder / "cases", name, **values) for name, values in STUDIES.items()]
     SWEEP.run_job(load_studies(cases[0])[0].cases[0])
 
@@ -102,8 +85,8 @@ def complete_store(folder):
 
     assert not (ended := forked(fill, 600)).death, ended
     for words in (["plan", *cases], ["status"], ["export", "--force", "-o", folder / "out.csv"]):
-        assert command(*words, "-r", folder / "complete").code == 0  # what forks need is imported
-    return folder / "complete", cases
+        assert command(*words, "-r", folder / "complete").code == 0
+    return folder / "complete", cases, whole(folder / "complete")
 
 
 def contents(folder, foreign=()):
@@ -184,7 +167,6 @@ def forked(work, seconds=SECONDS):
     """Do some work in a process of its own, which may crash or hang."""
 
     def begin():
-        os.setpgid(0, 0)
         faulthandler.disable()  # of pytest: a death is reported as `Ended.death`
         try:
             theirs.send(Ended(work()))
@@ -195,12 +177,11 @@ def forked(work, seconds=SECONDS):
     child = FORK.Process(target=begin)
     child.start()
     theirs.close()
-    ended = None
-    with contextlib.suppress(EOFError):
+    try:
         ended = ours.recv() if ours.poll(seconds) else Ended(None, f"hangs: {seconds:.0f} s")
-    if ended and ended.death.startswith("hangs"):
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(child.pid, signal.SIGKILL)
+    except EOFError:
+        ended = None
+    child.kill()  # where it hangs
     child.join()
     code = child.exitcode
     died = signal.Signals(-code).name if code < 0 else f"exit code {code}"

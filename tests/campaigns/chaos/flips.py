@@ -5,33 +5,33 @@ store may change; every reader must give what the undamaged store gives, or say 
 warning that it does not; the run that made the store must mend it. Nothing may crash or hang.
 """
 
-import random
 import shutil
-from functools import cache, partial
+from functools import partial
 
-from chaos.common import Tally, command, complete_store, differing, forked, fresh, run_here, whole
+from chaos.common import command, complete_store, differing, forked, run_here, whole
 from compressor.store.files import StoreError
 from compressor.store.stored import read_store
 
+WHAT = "bit flips, truncations, zeroed blocks in stored files"
 READERS = ("status", "status --json", "show KEY", "show KEY --json")
 MEND_EVERY = 5  # trials
 
 
-def hurt(data, rng):
+def hurt(data, draw):
     """What is done to a file's bytes, and what they become; never the same."""
     while True:
-        new, at = bytearray(data), rng.randrange(len(data))
-        how, block = rng.choice(("bits", "cut", "zeros", "grown")), rng.choice((1, 16, 512, 4096))
+        new, at = bytearray(data), draw.randrange(len(data))
+        how, block = draw.choice(("bits", "cut", "zeros", "grown")), draw.choice((1, 16, 512, 4096))
         if how == "bits":
-            for place in {at, *(rng.randrange(len(new)) for _ in range(rng.choice((0, 0, 1, 9))))}:
-                new[place] ^= 1 << rng.randrange(8)
+            for place in draw.sample(range(len(new)), draw.choice((1, 1, 2, 10))):
+                new[place] ^= 1 << draw.randrange(8)
         elif how == "cut":
-            del new[rng.choice((at, 0, len(new) - 1)) :]
+            del new[draw.choice((at, 0, len(new) - 1)) :]
         elif how == "zeros":
-            end = rng.choice((at + block, len(new)))
+            end = draw.choice((at + block, len(new)))
             new[at:end] = bytes(len(new[at:end]))
         else:
-            new += rng.randbytes(rng.choice((1, 100)))
+            new += draw.randbytes(draw.choice((1, 100)))
         if new != data:
             return f"{how} at {at}", bytes(new)
 
@@ -66,35 +66,22 @@ def mend(store, cases, expected):
     return differing(whole(store), expected) if said.code == 3 else str(said)  # one is to fail
 
 
-def campaign(trials, seed, folder):
-    """Damage as many files, one a trial."""
-    names = ("mended", "no reader is touched")
-    tally = Tally("bit flips, truncations, zeroed blocks in stored files", seed, names)
-    complete, cases = complete_store(folder)
-    expected, keys = whole(complete), sorted(read_store(complete).keys())
-    with fresh(folder) as place:
-        store = place / "store"
-
-        @cache
-        def undamaged(reader):
-            return forked(lambda: command(*reader.split(), "-r", store)).result
-
-        for number in range(trials):
-            rng = random.Random(f"{seed} {number}")
-            shutil.rmtree(store, ignore_errors=True)
-            shutil.copytree(complete, store)
-            kind = rng.choice(("batches", "studies"))
-            file = rng.choice(sorted((complete / kind).iterdir())).relative_to(complete)
-            reader = rng.choice(READERS).replace("KEY", rng.choice(keys))
-            was = undamaged(reader)
-            how, data = hurt((complete / file).read_bytes(), rng)
-            (store / file).write_bytes(data)
-            ended = forked(partial(look, store, file, reader, was, expected))
-            problem, is_found = ended.result or (ended.death, True)
-            if number % MEND_EVERY == 0 and not problem:
-                tally.counts["mended"] += 1
-                ended = forked(partial(mend, store, cases, expected))
-                problem = ended.death or ended.result
-            tally.counts.update([f"in {kind}"] + ["no reader is touched"] * (not is_found))
-            tally.note(f"trial {number}, {file} {how}", problem)
-    return tally.result()
+def trial(place, draw, number, counts):
+    """Damage a file."""
+    complete, cases, expected = complete_store(place.parent)
+    store = shutil.copytree(complete, place / "store")
+    kind = draw.choice(("batches", "studies"))
+    file = draw.choice(sorted((complete / kind).iterdir())).relative_to(complete)
+    keys = sorted(read_store(complete).keys())
+    reader = draw.choice(READERS).replace("KEY", draw.choice(keys))
+    was = forked(lambda: command(*reader.split(), "-r", store)).result
+    how, data = hurt((complete / file).read_bytes(), draw)
+    (store / file).write_bytes(data)
+    ended = forked(partial(look, store, file, reader, was, expected))
+    problem, is_found = ended.result or (ended.death, True)
+    if number % MEND_EVERY == 0 and not problem:
+        counts["mended"] += 1
+        ended = forked(partial(mend, store, cases, expected))
+        problem = ended.death or ended.result
+    counts.update([f"in {kind}"] + ["no reader is touched"] * (not is_found))
+    return problem and f"{file} {how}: {problem}"

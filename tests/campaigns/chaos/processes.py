@@ -11,16 +11,18 @@ import re
 import select
 import signal
 import sys
-import termios
 import time
-import traceback
+from functools import cache, partial
 from pathlib import Path
 
 from compsim.cli import main
 
-from chaos.common import FOREIGN, MASSES, contents, fresh, rods_file
+from chaos.common import FOREIGN, FORK, SWEEP, contents, fresh, rods_file
+from compressor.sweep.worker import Workers
 
 PROGRESS = re.compile(rb"(\d+) of \d+ jobs, \d+ %")
+JOBS = {"metrics": (100, 600), "series": (24, 24)}  # of `start`, and of its real command
+MASSES = [3 + n / 500 for n in range(24)]  # of the first rods of `start`, kg
 
 
 class Run:
@@ -31,13 +33,10 @@ class Run:
 
     def __init__(self, arguments, folder, real=False, prepare=lambda: None):
         self.master, slave = pty.openpty()
-        mode = termios.tcgetattr(slave)
-        mode[1] &= ~termios.OPOST  # lines end as they were written
-        termios.tcsetattr(slave, termios.TCSANOW, mode)
-        self.terminal, self.code = b"", None
-        self.pid = os.fork()
-        if not self.pid:
-            become(arguments, folder, slave, real, prepare)
+        self.terminal = b""
+        self.child = FORK.Process(target=become, args=(arguments, folder, slave, real, prepare))
+        self.child.start()
+        self.pid = self.child.pid
         os.close(slave)
 
     def watch(self, seconds):
@@ -60,15 +59,7 @@ class Run:
 
     def runs(self):
         """Whether it has not ended."""
-        if self.code is None:
-            pid, status = os.waitpid(self.pid, os.WNOHANG)
-            if pid:
-                self.code = os.waitstatus_to_exitcode(status)
-        return self.code is None
-
-    def workers(self):
-        """The processes that it has started and that run: workers, and what they are copies of."""
-        return [pid for pid in members(self.pid) if pid != self.pid]
+        return self.child.is_alive()
 
     def send(self, number, whole=False):
         """Send a signal to itself alone, or to the whole session at once."""
@@ -91,7 +82,9 @@ class Run:
         os.close(self.master)
         if late:
             return f"ran for more than {seconds:g} s"
-        return f"{len(left)} processes outlived it by {orphans:g} s" if left else self.code
+        return (
+            f"{len(left)} processes outlived it by {orphans:g} s" if left else self.child.exitcode
+        )
 
     def told(self):
         """How many stored jobs its progress has told of: those that it has acknowledged."""
@@ -100,39 +93,50 @@ class Run:
 
     def text(self):
         """All that its terminal has shown."""
-        return self.terminal.decode(errors="replace")
+        return self.terminal.decode(errors="replace").replace("\r\n", "\n")
 
 
-def undisturbed(folder, keep):
-    """What a run that nobody disturbs stores of a job of each of `MASSES`: key -> digest."""
+def start(folder, keep, is_real=False):
+    """Start a sweep in a folder, to its subfolder `out`."""
+    rods_file(folder, "rods", [3 + n / 500 for n in range(JOBS[keep][is_real])], keep)
+    return Run(["run", "rods.yaml", "-j", "2", "-r", "out"], folder, is_real, hurried)
+
+
+def hurried():
+    """Have a fork's workers store all the time, on a slow disk: that is what kills should hit."""
+    SWEEP.Workers = partial(Workers, target_seconds=0.02)
+    SWEEP.store_outcomes = store_slowly
+
+
+def store_slowly(folder, outcomes, real=SWEEP.store_outcomes, fsync=os.fsync):
+    """Store a batch, in a worker, on a disk that takes its time."""
+    os.fsync = lambda descriptor: (time.sleep(0.02), fsync(descriptor))
+    return real(folder, outcomes)
+
+
+@cache
+def undisturbed(folder, keep, is_real=False):
+    """The seconds of a sweep that nobody disturbs, and what it stores: key -> digest."""
     with fresh(folder) as place:
-        rods_file(place, "one", MASSES, keep)
-        run = Run(["run", "one.yaml", "-r", "out", "-j", "2"], place)
+        began, run = time.monotonic(), start(place, keep, is_real)
         code = run.finish(600)  # it may have to compile
         assert code == 0, f"{code}: {run.text()[-500:]}"
-        return contents(place / "out", FOREIGN)
+        return time.monotonic() - began, contents(place / "out", FOREIGN)
 
 
 def become(arguments, folder, terminal, real, prepare):
     """Make a forked child the run: session, folder, streams, command; never returns."""
-    code = 70
-    try:
-        os.setsid()
-        os.chdir(folder)
-        nothing = os.open(os.devnull, os.O_RDWR)
-        for stream, source in enumerate((nothing, nothing, terminal)):
-            os.dup2(source, stream)
-        os.closerange(3, 1024)
-        if real:
-            os.execv(sys.executable, [sys.executable, "-m", "compsim", *arguments])
-        sys.stdout, sys.stderr = open(1, "w"), open(2, "w", buffering=1)
-        prepare()
-        code = main(arguments)
-        sys.stdout.flush()
-    except BaseException:
-        traceback.print_exc()
-    finally:
-        os._exit(code)
+    os.setsid()
+    os.chdir(folder)
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for stream, source in enumerate((nothing, nothing, terminal)):
+        os.dup2(source, stream)
+    os.closerange(3, 1024)
+    if real:
+        os.execv(sys.executable, [sys.executable, "-m", "compsim", *arguments])
+    sys.stdout, sys.stderr = open(1, "w"), open(2, "w", buffering=1)
+    prepare()
+    sys.exit(main(arguments))
 
 
 def members(session):
