@@ -11,23 +11,14 @@ from pathlib import Path
 import compressor
 
 PAGE = Path(__file__).parent.parent / "compressor" / "API.md"
-SECTIONS = {
-    "Cases": ("load_cases", "Case", "PerJoint"),
-    "Groups of a case": (
-        "Offset", "Machine", "Gas", "Spring", "Contact", "Friction",
-        "Lubricant", "Guide", "Drive", "Rod", "Wear", "Body", "Sensor", "Solve", "Output",
-    ),
-    "Runs": ("simulate",),
-    "Results": ("open_study", "read_job"),
-    "Errors and warnings": (
-        "CompsimError", "CaseError", "CaseFileError", "StoreError", "CompsimWarning",
-        "StoreWarning",
-    ),
-}  # fmt: skip
+SECTIONS = {package.capitalize(): names for package, names in compressor.HOMES.items()}
+SECTIONS["Every package"] = ("CompsimError", "CompsimWarning")
 HELP = (
     "`help(compressor.simulate)` and the like show parameters, units, errors and examples. "
     "The fields of a group are the [keys of a case file](../configs/README.md#keys).\n"
 )
+PROPERTIES = property | cached_property
+METHODS = classmethod | staticmethod
 
 
 def public():
@@ -43,13 +34,9 @@ def members(owner):
     """The public methods and properties of a class and its bases, in the order of the sources."""
     for one in owner.__mro__:
         for name, made in vars(one).items():
-            known = property | cached_property | classmethod | staticmethod
-            if not name.startswith("_") and (inspect.isfunction(made) or isinstance(made, known)):
+            known = inspect.isfunction(made) or isinstance(made, PROPERTIES | METHODS)
+            if known and not name.startswith("_"):
                 yield name, made
-
-
-def is_property(made):
-    return isinstance(made, property | cached_property)
 
 
 def signature(made):
@@ -60,15 +47,11 @@ def signature(made):
     return re.sub(r"^\((self|cls)(, )?", "(", text)
 
 
-def summary(made):
-    """The first paragraph of a docstring, which is one line."""
-    return inspect.cleandoc(made.__doc__).partition("\n\n")[0]
-
-
 def entry(name, made):
     """A line for one public name; classes are called with keywords, so they have no signature."""
     called = "" if inspect.isclass(made) else signature(made)
-    return f"- `{name}{called}`: {summary(made)}\n"
+    summary, *_ = inspect.cleandoc(made.__doc__).partition("\n\n")
+    return f"- `{name}{called}`: {summary}\n"
 
 
 def page():
@@ -81,10 +64,9 @@ def page():
     for title, names in SECTIONS.items():
         parts.append(f"## {title}\n")
         parts.append("".join(entry(name, getattr(compressor, name)) for name in names))
-        if title == "Cases":
-            methods = [(n, made) for n, made in members(compressor.Case) if not is_property(made)]
-            parts.append("`Case` has these methods, and properties that `help` lists:\n")
-            parts.append("".join(entry(f"Case.{n}", made) for n, made in methods))
+    methods = [pair for pair in members(compressor.Case) if not isinstance(pair[1], PROPERTIES)]
+    parts.append("`Case` has these methods, and properties that `help` lists:\n")
+    parts.append("".join(entry(f"Case.{name}", made) for name, made in methods))
     return "\n".join(parts)
 
 
