@@ -29,11 +29,6 @@ SIGNS = ("==", "!=", "<", "<=", ">", ">=")
         ("load == spring", True), ("load != spring", False), ("solve.error_bars == true", True),
         ("gas.exponent < 2", False), ("gas.exponent >= 2", False), ("gas.exponent != 2", True),
         ("not gas.exponent < 2", True), ("not not load == spring", True),
-        ("load == none or clearance_mm < 1 and joint == both", False),
-        ("(load == none or clearance_mm < 1) and joint == big_end", True),
-        ("load == spring or load == none and load == gas", True),
-        ("not load == none and joint == both", False),
-        ("not (load == none and joint == both)", True),
         ("  machine.speed_rpm  >  +4.0E2  ", True),
         ("machine.speed_rpm == 0x1F4", True), ("clearance_mm > -.5", True),
         ("\n load\t==\n design\x1f", True), ("(load) == (design)", True),
@@ -47,23 +42,20 @@ def test_a_comparison_holds_or_not(text, holds):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", UNREADABLE), ("clearance_mm", NEEDS.format("'clearance_mm'")),
         ("clearance_mm = 1", "write == for equal"),
         ("(load == none", UNREADABLE), ("load == none and", UNREADABLE),
         ("clearance_mm > 10mm", UNREADABLE), ("load == none # both", UNREADABLE),
         ("(" * 300 + "load == none" + ")" * 300, UNREADABLE),
         ("clearance_mm > big", "clearance_mm needs a number, not big"),
-        ("load == sprnig", "load needs spring, gas or none, not sprnig"),
         ("load < none", "load is a word: compare it by == or !="),
-        ("speed_rpm > 1", "unknown key 'speed_rpm'; did you mean machine.speed_rpm?"),
         ("contact.materials == steel", "contact.materials cannot be compared"),
-        ("__import__(os)", NEEDS.format("'__import__(os)'")),
         ("__import__ == 1", "unknown key '__import__'"),
         ("clearance_mm > 0.1 < 0.5", NEEDS.format("'clearance_mm > 0.1 < 0.5'")),
         (" " * (MAX_LENGTH + 1), "is longer than 1000 characters"),
     ],
 )  # fmt: skip
 def test_what_is_no_comparison_is_told(text, message):
+    """Beside what mistakes.json has of exclude."""
     with pytest.raises(NoComparison) as error:
         comparison(text)
     assert str(error.value) == message

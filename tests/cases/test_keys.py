@@ -8,11 +8,9 @@ import pytest
 
 from compressor.cases.case import Case, CaseError
 from compressor.cases.checks import DOUBLES
-from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.materials import composite_modulus, contact_stiffness
 from compressor.cases.parameter import PerJoint
 from compressor.cases.study import Axis
-from compressor.physics.film import film
 from compressor.solve.si_record import record
 
 # ---- pins: a radius each, their contact and their bearings
@@ -47,20 +45,12 @@ def test_a_case_is_replaced_in_the_words_of_a_case(values):
     assert str(replaced.value) == str(made.value)
 
 
-def test_a_part_is_set_by_its_path_beside_the_other(tmp_path):
-    path = tmp_path / "worn.yaml"
-    path.write_text("joint: both\nclearance_mm: 0.1\n", encoding="utf-8")
-    with pytest.raises(CaseFileError) as error:
-        load_studies(path, overrides=["machine.pin_radius_mm.small_end=90"])
-    assert "needs both, big_end and small_end, not small_end" in str(error.value)
+def test_a_part_is_set_by_its_path_beside_the_other(read):
     small = "machine.pin_radius_mm.small_end=90"
-    for pins in (["machine.pin_radius_mm.big_end=60", small],
-                 ["machine.pin_radius_mm={big_end: 60, small_end: 90}"]):  # fmt: skip
-        (study,) = load_studies(path, overrides=pins)
+    for text, overrides in (("", ["machine.pin_radius_mm.big_end=60", small]),
+                            ("machine: {pin_radius_mm: 60}\n", [small])):  # fmt: skip
+        study = read(f"joint: both\nclearance_mm: 0.1\n{text}", *overrides)
         assert study.cases[0].machine.pin_radius_mm == PerJoint(60, 90)
-    path.write_text("joint: both\nclearance_mm: 0.1\nmachine: {pin_radius_mm: 60}\n")
-    (study,) = load_studies(path, overrides=[small])
-    assert study.cases[0].machine.pin_radius_mm == PerJoint(60, 90)
 
 
 def test_a_pin_of_a_file_s_own_lies_in_its_bore():
@@ -79,19 +69,8 @@ PINS = {"pin_radius_mm": {"big_end": 60, "small_end": 35}}
 
 
 def test_each_bearing_has_a_length_of_its_own():
-    """The film of a joint is that of a machine whose bearings are all as long as its own."""
-    oil = {"lubricant": {"bearing_length_mm": LENGTHS}, "machine": PINS}
-    two = case(**oil)
+    two = case(lubricant={"bearing_length_mm": LENGTHS}, machine=PINS)
     assert record(two)["film_length"].tolist() == [0.06, 0.04]
-    for number, length in enumerate(LENGTHS.values()):
-        one = case(machine=PINS, lubricant={"bearing_length_mm": length})
-        assert one.lubricant.bearing_length_mm == PerJoint(length, length)
-        forces = [
-            film(number, (1e-4, -5e-5, 0.02, 0.01), (52.0, -8.0), record(both))
-            for both in (two, one)
-        ]
-        assert forces[0] == forces[1]
-        assert forces[0][0] != 0.0
     alike = case(lubricant={"bearing_length_mm": {"big_end": 15, "small_end": 15}})
     assert alike.key == case(lubricant={"bearing_length_mm": 15}).key
 
@@ -112,7 +91,7 @@ def test_each_pin_has_materials_and_a_length_of_its_own():
     assert record(line)["stiffness"].tolist() == pytest.approx(expected, rel=1e-14)
 
 
-def test_files_have_a_pair_for_each_pin_and_sweep_lengths(tmp_path):
+def test_files_have_a_pair_for_each_pin_and_sweep_lengths(read):
     values = WORN | {
         "machine": PINS,
         "contact": {
@@ -121,8 +100,7 @@ def test_files_have_a_pair_for_each_pin_and_sweep_lengths(tmp_path):
             "length_mm": {"big_end": [50, 60], "small_end": 40},
         },
     }
-    (tmp_path / "s.yaml").write_text(json.dumps(values))
-    (study,) = load_studies(tmp_path / "s.yaml")
+    study = read(json.dumps(values))
     assert [axis.key for axis in study.axes] == ["contact.length_mm.big_end"]
     assert [one.contact.length_mm for one in study.cases] == [PerJoint(50, 40), PerJoint(60, 40)]
     assert {one.contact.materials.small_end for one in study.cases} == {("steel", "copper")}
@@ -152,8 +130,6 @@ def test_what_is_so_by_default_makes_no_other_job():
 
 def test_clearances_are_of_the_stroke():
     """240 mm here; the crank end has the head's millimetres where nothing else is given."""
-    found = record(cylinder(DOUBLE | {"clearance_percent": {"head": 10, "crank": 12.5}}))
-    assert (found.head_clearance, found.crank_clearance) == pytest.approx((0.024, 0.03))
     found = record(cylinder(DOUBLE))
     assert (found.head_clearance, found.crank_clearance) == (0.02, 0.02)
     found = record(cylinder(DOUBLE | {"clearance_percent": {"crank": 12.5}}))
@@ -187,9 +163,6 @@ def test_a_joint_is_worn_beyond_its_healthy_clearance(healthy, worn):
     case = Case.from_values(BOTH | named)
     assert case.worn_joint == worn
     assert case.key == Case.from_values(BOTH).key
-    assert case.physics_key == Case.from_values(BOTH).physics_key
-    assert Case.from_values(case.values()) == case
-    assert Case.from_attribute(case.attributes()["case"]) == case
 
 
 @pytest.mark.parametrize("joint", ["none", "big_end"])
@@ -210,8 +183,6 @@ def test_a_word_of_the_trade_is_twice_a_key(word):
     one = Case.from_values(more | {group: {name: 250}})
     assert one == Case.from_values(more | {group: {own: 125}})
     assert getattr(getattr(one, group), own) == 125.0
-    assert own in one.values()[group]
-    assert name not in one.values()[group]
 
 
 @pytest.mark.parametrize(
@@ -219,9 +190,7 @@ def test_a_word_of_the_trade_is_twice_a_key(word):
     [
         ("180", None),
         ("[160, 200]", (80.0, 100.0)),
-        ("{linspace: [160, 200, 3]}", (80.0, 90.0, 100.0)),
         ("{range: [160, 200, 20]}", (80.0, 90.0, 100.0)),
-        ("{logspace: [100, 200, 2]}", (50.0, 100.0)),
     ],
 )
 def test_a_stroke_is_swept_as_a_radius(read, swept, radii):

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_cases, load_studies
-from compressor.cases.yaml_reader import MAX_BYTES, resolve_scalar
+from compressor.cases.yaml_reader import MAX_BYTES, FileProblem, resolve_scalar
 
 BIG_END = "joint: big_end\nclearance_mm: 0.1\n"
 one_file = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=3000)
@@ -201,21 +201,19 @@ GAPS = [": ", "- ", "\n", "\n  ", "\t", " ", "%YAML 1.3\n"]
 YAMLISH = st.lists(st.sampled_from([*WORDS.split(), *SIGNS.split(), *GAPS]), max_size=40)
 
 
-def refusal(path: str, *overrides: str) -> CaseFileError | None:
+def problems(path: str, *overrides: str) -> list[FileProblem]:
     try:
         load_studies(path, overrides=overrides)
     except CaseFileError as error:
-        return error
-    return None
+        return error.problems or pytest.fail("no problem is named")
+    return []
 
 
 @one_file
 @given(st.text() | st.binary() | YAMLISH.map("".join) | YAMLISH.map(" ".join))
 def test_any_file_is_read_or_refused(write, text):
     content = text.encode(errors="replace") if isinstance(text, str) else text
-    error = refusal(write(content))
-    assert error is None or error.problems
-    for problem in error.problems if error else ():
+    for problem in problems(write(content)):
         assert str(problem).isprintable()
         assert problem.place.line <= content.count(b"\n") + content.count(b"\r") + 2
 
@@ -223,6 +221,5 @@ def test_any_file_is_read_or_refused(write, text):
 @one_file
 @given(st.text() | YAMLISH.map("".join).map("joint=".__add__))
 def test_any_override_is_read_or_refused(write, text):
-    error = refusal(write(BIG_END), text)
-    for problem in error.problems if error else ():
+    for problem in problems(write(BIG_END), text):
         assert str(problem).startswith(("--set ", "case.yaml:"))

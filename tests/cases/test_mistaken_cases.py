@@ -62,18 +62,6 @@ def settings(values, before=""):
             yield f"{before}{key}={json.dumps(value, ensure_ascii=False)}"
 
 
-@pytest.mark.parametrize(("text", "lines", "ways"), ROWS)
-def test_a_mistake_is_answered_with_place_key_and_remedy(text, lines, ways, tmp_path):
-    assert told(text, tmp_path) == lines
-    assert all(line.isprintable() for line in lines)  # nothing that steers a terminal
-    if "values" in ways:
-        assert without_places(refusal(values_of(text))) == without_places(lines)
-    if "set" in ways:
-        by_set = told("{}", tmp_path, [*settings(values_of(text))])
-        assert without_places(by_set) == without_places(lines)
-    assert ("schema" in ways) is marked(values_of(text))
-
-
 def marked(values):
     """Whether an editor marks a file of these values."""
     return values is not None and not SCHEMA.is_valid(values)
@@ -91,6 +79,12 @@ def row(text, folder):
     if marked(values):
         ways.append("schema")
     return [text, lines, ways]
+
+
+@pytest.mark.parametrize("expected", ROWS, ids=lambda row: row[0])
+def test_a_mistake_is_answered_with_place_key_and_remedy(expected, tmp_path):
+    assert row(expected[0], tmp_path) == expected
+    assert all(line.isprintable() for line in expected[1])  # nothing that steers a terminal
 
 
 def write_table(texts):

@@ -218,51 +218,35 @@ blocks:
     assert [case.friction is None for case in study.cases] == [False, False, True, False, False]
 
 
+OWN_VALUES = {"machine.counterweight_kg_mm": (0, 500, 0), "clearance_mm": (0.1, 0.1, 0.2)}
+
+
 @pytest.mark.parametrize(
-    "text",
+    ("text", "axes"),
     [
-        "clearance_mm: [0.1, 0.2]\nmachine: {counterweight_kg_mm: [0, 500]}\n"
-        "exclude: clearance_mm == 0.2 and machine.counterweight_kg_mm == 500\n",
-        "machine: {counterweight_kg_mm: [0, 500, 0]}\nclearance_mm: [0.1, 0.1, 0.2]\n"
-        "zip: [[clearance_mm, machine.counterweight_kg_mm]]\n",
-        "blocks: [{machine: {counterweight_kg_mm: [0, 500]}, clearance_mm: 0.1}, "
-        "{machine: {counterweight_kg_mm: 0}, clearance_mm: 0.2}]\n",
+        # also of 0, which a case writes as no counterweight
+        ("clearance_mm: [0.1, 0.2]\nmachine: {counterweight_kg_mm: [0, 500]}\n"
+         "exclude: clearance_mm == 0.2 and machine.counterweight_kg_mm == 500\n", OWN_VALUES),
+        ("machine: {counterweight_kg_mm: [0, 500, 0]}\nclearance_mm: [0.1, 0.1, 0.2]\n"
+         "zip: [[clearance_mm, machine.counterweight_kg_mm]]\n", OWN_VALUES),
+        ("blocks: [{machine: {counterweight_kg_mm: [0, 500]}, clearance_mm: 0.1}, "
+         "{machine: {counterweight_kg_mm: 0}, clearance_mm: 0.2}]\n", OWN_VALUES),
+        # words that a case writes as none
+        ("clearance_mm: 0.2\nfriction: {law: [adams, lugre], ideal_joints: [false, true]}\n"
+         "exclude: friction.law == lugre and friction.ideal_joints == true",
+         {"friction.law": ("adams", "adams", "lugre"),
+          "friction.ideal_joints": (False, True, False)}),
+        # the law of a job reads no coefficient of restitution, another one does
+        ("clearance_mm: 0.2\ncontact: {law: [hertz, flores], restitution: [0.5, 0.9], "
+         "materials: [steel, steel], geometry: [external, internal]}\n"
+         "exclude: contact.law == hertz and contact.restitution == 0.9",
+         {"contact.restitution": (None, None, 0.5, 0.5, 0.9, 0.9),
+          "contact.geometry": ("external", "internal") * 3}),
     ],
-)
-def test_an_axis_of_no_grid_has_the_values_that_the_file_gives(read, text):
-    """Also of 0, which a case writes as no counterweight."""
-    axes = {axis.key: axis.values for axis in read(ONE + text).axes}
-    assert axes["machine.counterweight_kg_mm"] == (0, 500, 0)
-    assert axes["clearance_mm"] == (0.1, 0.1, 0.2)
-
-
-def test_words_that_a_case_writes_as_none_stay_on_their_axis(read):
-    study = read("""\
-joint: [none, big_end]
-clearance_mm: [0, 0.2]
-friction: {law: [adams, lugre], ideal_joints: [false, true]}
-exclude: friction.law == lugre and friction.ideal_joints == true
-""")
-    axes = {axis.key: axis.values for axis in study.axes}
-    assert axes["friction.law"] == ("adams", "adams", "lugre") * 4
-    assert axes["friction.ideal_joints"] == (False, True, False) * 4
-    assert axes["clearance_mm"] == (None,) * 6 + (0,) * 3 + (0.2,) * 3
-
-
-def test_an_axis_of_no_grid_has_no_value_that_a_job_has_not(read):
-    """The law of a job reads no coefficient of restitution, another one does."""
-    study = read(
-        ONE
-        + """\
-clearance_mm: 0.2
-contact: {law: [hertz, flores], restitution: [0.5, 0.9], materials: [steel, steel],
-  geometry: [external, internal]}
-exclude: contact.law == hertz and contact.restitution == 0.9
-"""
-    )
-    axes = {axis.key: axis.values for axis in study.axes}
-    assert axes["contact.restitution"] == (None, None, 0.5, 0.5, 0.9, 0.9)
-    assert axes["contact.geometry"] == ("external", "internal") * 3
+)  # fmt: skip
+def test_an_axis_of_no_grid_has_the_values_that_the_file_gives_and_a_job_has(read, text, axes):
+    found = {axis.key: axis.values for axis in read(ONE + text).axes}
+    assert {key: found[key] for key in axes} == axes
 
 
 def test_a_block_takes_the_place_of_the_files_keys_and_an_override_of_both(read):
@@ -314,10 +298,8 @@ def test_any_sweep_is_planned_or_refused(read, text):
 
 
 def test_a_sample_that_samples_nothing_is_refused_whatever_else_is_set(read):
-    one = "joint: both\nclearance_mm: {CLEARANCE}\nsample: {n: 4}"
-    plain, drawn = one.replace("{CLEARANCE}", "0.1"), one.replace("CLEARANCE", "random: [0.1, 0.2]")
-    block = "blocks: [{load: none}, {joint: both, clearance_mm: 0.1, sample: {n: 4}}]"
-    for text, overrides in ((plain, ()), (plain, ("machine.speed_rpm=300",)), (block, ())):
-        with pytest.raises(CaseFileError, match="samples nothing"):
-            read(text, *overrides)
+    """Without anything set: mistakes.json."""
+    plain = "joint: both\nclearance_mm: 0.1\nsample: {n: 4}"
+    assert "samples nothing" in refused(read, plain, "machine.speed_rpm=300")[0]
+    drawn = "joint: both\nclearance_mm: {random: [0.1, 0.2]}\nsample: {n: 4}"
     assert read(drawn, "clearance_mm=0.1").jobs == 1

@@ -11,7 +11,7 @@ from conftest import outcome_of
 
 from compressor.cases.case import Case
 from compressor.cases.checks import value_of
-from compressor.cases.load import CaseFileError, load_cases, load_studies
+from compressor.cases.load import CaseFileError, load_cases
 from compressor.cases.parameter import CaseError
 from compressor.cases.table import parts_by_key, table
 from compressor.solve import simulate
@@ -272,14 +272,6 @@ def test_every_key_of_the_table_has_an_entry():
     assert sorted(ENTRIES) == sorted(table())
 
 
-def test_every_key_with_a_reader_is_refused_somewhere():
-    rows = [row.key for row in table().values() if row.read]
-    assert [key for key in rows if not ENTRIES[key].unread] == [
-        "guide.clearance_mm",
-        "guide.friction",
-    ]
-
-
 @pytest.mark.parametrize("key", ENTRIES)
 def test_a_key_changes_what_is_stored(key):
     value, where, _ = ENTRIES[key]
@@ -352,7 +344,6 @@ IN_GAS = "nothing reads this group: it needs load == gas; set that, or leave the
     [
         ("load: [gas, spring]\ngas: {back_pressure_MPa: 0.1}", [], []),
         ("gas: {back_pressure_MPa: 0.1}\nblocks: [{load: gas}, {load: none}]", [], []),
-        ("lubricant: true\njoint: [none, big_end]\nclearance_mm: 0.1", [], []),
         ("joint: both\nclearance_mm: 0.1\nguide: {friction: [0, 0.1]}", [], []),
         ("{}", ["gas.exponent=1.3"], [f"--set gas.exponent=1.3: gas: {IN_GAS}"]),
         # what the command line takes the reader from is the file's, and no mistake of it
@@ -362,27 +353,17 @@ IN_GAS = "nothing reads this group: it needs load == gas; set that, or leave the
         ("joint: big_end\nclearance_mm: 0.1", ["clearance_mm.big_end=0.2"], []),
     ],
 )  # fmt: skip
-def test_one_job_that_reads_a_key_is_enough(text, overrides, expected, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "case.yaml").write_text(text)
+def test_one_job_that_reads_a_key_is_enough(text, overrides, expected, read):
     found = []
     try:
-        load_studies("case.yaml", overrides=overrides)
+        read(text, *overrides)
     except CaseFileError as error:
         found = [str(problem) for problem in error.problems]
     assert found == expected
 
 
-def test_one_file_that_reads_an_override_is_enough(tmp_path):
-    paths = [tmp_path / "gas.yaml", tmp_path / "spring.yaml"]
-    paths[0].write_text("load: gas")
-    paths[1].write_text("load: spring")
-    assert len(load_studies(*paths, overrides=["gas.back_pressure_MPa=0.1"])) == 2
-
-
-def test_a_job_has_one_key_beside_oil_that_it_has_no_room_for(tmp_path):
-    (tmp_path / "oil.yaml").write_text("lubricant: true\njoint: [none, big_end]\nclearance_mm: 0.1")
-    dry, oiled = load_cases(tmp_path / "oil.yaml")
+def test_a_job_has_one_key_beside_oil_that_it_has_no_room_for(read):
+    dry, oiled = read("lubricant: true\njoint: [none, big_end]\nclearance_mm: 0.1").cases
     assert dry.lubricant is None
     assert dry.key == Case().key
     assert oiled.lubricant is not None

@@ -14,14 +14,12 @@ from pathlib import Path
 import pytest
 from compsim import screen
 
-from compressor.analysis.runs import paper_cases
 from compressor.cases import load
 from compressor.cases.load import load_cases
 from compressor.program import duration
 from compressor.store import reader as store
 from compressor.store.studies import read_studies
 
-CONFIGS = Path(__file__).parents[2] / "configs"
 SOLVE = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 PATIENCE = 600  # s, until something happens: it may take a second, or the kernel is compiled
 
@@ -57,12 +55,6 @@ def test_a_run_says_what_it_did_and_what_comes_next(case_file, compsim):
     assert again.out == out
     assert {path: path.stat().st_mtime_ns for path in Path("out dir").glob("*/*")} == stamps
     assert again.err.startswith("nothing to do: all 3 jobs are stored in out dir\n")
-
-
-def test_configs_are_the_paper_s_cases_and_nothing_else():
-    found = load_cases(*CONFIGS.glob("*.yaml"))
-    assert sorted(case.key for case in found) == sorted(c.key for c in paper_cases().values())
-    assert {path.suffix for path in CONFIGS.iterdir()} == {".yaml", ".md"}
 
 
 @pytest.mark.parametrize("quiet", [[], ["--quiet"]])
@@ -170,9 +162,8 @@ def test_the_unforeseen_is_told_with_its_traceback(case_file, compsim, monkeypat
 @pytest.mark.parametrize(
     ("say", "thing", "text"),
     [
-        (duration, 0.04, "0.0 s"), (duration, 9.9, "9.9 s"), (duration, 99, "99 s"),
-        (duration, 101, "2 min"), (duration, 7200, "2 h 00 min"),
-        (screen.size, 0, "0 B"), (screen.size, 999, "999 B"), (screen.size, 1000, "1 kB"),
+        (duration, 9.9, "9.9 s"), (duration, 99, "99 s"), (duration, 101, "2 min"),
+        (duration, 7200, "2 h 00 min"), (screen.size, 999, "999 B"), (screen.size, 1000, "1 kB"),
         (screen.point_text, {"a": 0.56 / 3, "b": "gas", "c": 700.0}, " a=0.186667 b=gas c=700"),
         (screen.size, 2_345_678, "2.35 MB"), (screen.size, 12_345_678_901, "12.35 GB"),
     ],
@@ -234,103 +225,67 @@ def test_explain_models_prints_what_moves_metrics(case_file, compsim, monkeypatc
 # ---- signals ------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def answering():
-    """Set what this process does at a signal, whatever it inherited: nohup ignores SIGHUP."""
-    before = {}
+@pytest.mark.parametrize(("name", "code"), [("INT", 130), ("TERM", 143), ("HUP", 129)])
+def test_exit_codes_of_signals_but_of_those_ignored(name, code, case_file, compsim, monkeypatch):
+    """They arrive while the case files are read."""
+    number, read = signal.Signals[f"SIG{name}"], load.load_studies
 
-    def answer(number, what):
-        before.setdefault(number, signal.getsignal(number))
-        signal.signal(number, what)
+    def raised(*words, **more):
+        signal.raise_signal(number)  # to this thread: another one may be slow to hand it over
+        return read(*words, **more)
 
-    yield answer
-    for number, what in before.items():
-        signal.signal(number, what)
-
-
-@pytest.fixture
-def signalled(monkeypatch):
-    """Have a signal arrive while the next command reads its case files."""
-
-    def arrive(number):
-        read = load.load_studies
-
-        def raised(*words, **more):
-            signal.raise_signal(number)  # to this thread: another one may be slow to hand it over
-            return read(*words, **more)
-
-        monkeypatch.setattr("compressor.cases.load_studies", raised)
-
-    return arrive
-
-
-@pytest.mark.parametrize(("number", "code"), [("INT", 130), ("TERM", 143), ("HUP", 129)])
-def test_exit_codes_of_signals(number, code, case_file, compsim, answering, signalled):
-    number = signal.Signals[f"SIG{number}"]
-    answering(number, signal.SIG_DFL)
-    signalled(number)
-    assert compsim("run", case_file("one.yaml"), code=code).err == f"interrupted by {number.name}\n"
-    assert signal.getsignal(number) == signal.SIG_DFL
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_that_was_ignored_stays_ignored(number, case_file, compsim, answering, signalled):
-    answering(number, signal.SIG_IGN)  # as nohup does, and a shell for what runs behind it
-    signalled(number)
-    assert "interrupted" not in compsim("plan", case_file("one.yaml")).err
-    assert signal.getsignal(number) == signal.SIG_IGN
+    monkeypatch.setattr("compressor.cases.load_studies", raised)
+    path, former = case_file("one.yaml"), signal.signal(number, signal.SIG_DFL)
+    try:
+        assert compsim("run", path, code=code).err == f"interrupted by {number.name}\n"
+        assert signal.getsignal(number) == signal.SIG_DFL
+        signal.signal(number, signal.SIG_IGN)  # as nohup does, and a shell for what runs behind it
+        assert "interrupted" not in compsim("plan", path).err
+        assert signal.getsignal(number) == signal.SIG_IGN
+    finally:
+        signal.signal(number, former)
 
 
 JOBS = 60  # more than are done when a run is told to end
 
 
-@pytest.fixture
-def started(tmp_path, answering):
-    """A real `compsim run` in its own process group, with at least one job done."""
-    answering(signal.SIGINT, signal.SIG_DFL)  # a child inherits what is ignored
+def is_running(group):
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def wait_for(condition):
+    deadline = time.monotonic() + PATIENCE
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert condition()
+
+
+def test_a_run_that_is_told_to_end(tmp_path):
+    """A real one, in its own process group, with at least one job done."""
     rods = [4 + number / 1000 for number in range(JOBS)]
     values = {"joint": "both", "clearance_mm": 0.1, "machine": {"rod_mass_kg": rods}}
-    (tmp_path / "many.yaml").write_text(
-        json.dumps(values | {"solve": SOLVE | {"method": "DOP853"}})
-    )
-    command = [sys.executable, "-c", "import sys; from compsim.cli import main; sys.exit(main())"]
-    process = subprocess.Popen(
-        [*command, "run", "many.yaml", "-j", "1"],
+    solve = SOLVE | {"method": "DOP853"}
+    (tmp_path / "many.yaml").write_text(json.dumps(values | {"solve": solve}))
+    run = subprocess.Popen(
+        [sys.executable, "-m", "compsim", "run", "many.yaml", "-j", "1"],
         cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
     try:
-        deadline = time.monotonic() + PATIENCE
-        while not [*tmp_path.glob("results/batches/*.h5")]:
-            assert process.poll() is None
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
-        yield process
+        wait_for(lambda: run.poll() is not None or [*tmp_path.glob("results/batches/*.h5")])
+        os.killpg(run.pid, signal.SIGINT)  # Ctrl-C reaches the whole group
+        err = run.communicate(timeout=PATIENCE)[1]
+        assert run.returncode == 130
+        wait_for(lambda: not is_running(run.pid))
     finally:
         with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        process.stderr.close()
-
-
-def group_is_gone(group):
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        try:
-            os.killpg(group, 0)
-        except ProcessLookupError:
-            return True
-        time.sleep(0.05)
-    return False
-
-
-def test_a_run_that_is_told_to_end(started, tmp_path):
-    os.killpg(started.pid, signal.SIGINT)  # Ctrl-C reaches the whole group
-    err = started.communicate(timeout=PATIENCE)[1]
-    assert started.returncode == 130
-    assert group_is_gone(started.pid)
-    kept = store.read_store(tmp_path / "results").keys()
-    assert 0 < len(kept) < JOBS
-    assert {store.read_store(tmp_path / "results").status(key).status for key in kept} == {"ok"}
+            os.killpg(run.pid, signal.SIGKILL)
+    stored = store.read_store(tmp_path / "results")
+    assert 0 < len(stored) < JOBS
+    assert {stored.status(key).status for key in stored.keys()} == {"ok"}  # noqa: SIM118
     goes_on = f"of {JOBS} jobs are stored in results; the same command goes on from there"
     slow = rf"(compil.+\n(  .+\n)*|\d+ of {JOBS} jobs, .+\n)*"  # told where it takes long
     machine = r"many: its machine, .+\n(  .+\n)+"

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from compressor.cases.examples import STARTS, templates
-from compressor.cases.load import load_studies
 
 
 @pytest.fixture(autouse=True)
@@ -29,8 +28,6 @@ def test_the_list_has_questions_jobs_and_times(compsim):
 def test_a_file_is_written_and_the_next_command_named(name, compsim):
     assert compsim("init", name) == (f"{name}.yaml\n", f"next: compsim run {name}.yaml\n")
     assert Path(f"{name}.yaml").read_text() == templates()[name].path.read_text()
-    (study,) = load_studies(f"{name}.yaml")
-    assert study.name == name
 
 
 def test_files_and_folders_may_be_chosen(compsim):

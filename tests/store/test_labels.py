@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from conftest import keep
-from made_jobs import SHORT, fill, study
+from made_jobs import fill, study
 
 from compressor.metrics import METRICS
 from compressor.solve.simulate import simulate
@@ -144,16 +144,6 @@ def test_several_studies_have_jobs_with_coordinates(grid, tmp_path):
     assert open_study(tmp_path, "grid").key.shape == (2, 2)
     with pytest.raises(StoreError, match=r"'gird'; did you mean grid\?"):
         open_study(tmp_path, "gird")
-
-
-def test_failed_jobs_have_a_reason_and_no_metrics(tmp_path):
-    solve = SHORT | {"max_steps": [5, 100000]}
-    fill(tmp_path, study("budgets", solve, joint="both", clearance_mm=0.1))
-    found = open_study(tmp_path)
-    assert found.reason.values.tolist() == ["budget_steps", ""]
-    assert np.isnan(found.peak_acceleration.values).tolist() == [True, False]
-    assert np.isfinite(found.acceleration.sel(max_steps=5)[0])
-    assert np.isnan(found.acceleration.sel(max_steps=5)[-1])
 
 
 def test_jobs_that_were_simulated_for_metrics_have_no_series_beside_others(tmp_path):

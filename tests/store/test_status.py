@@ -1,60 +1,94 @@
-"""What a store says of its studies and jobs: `compsim status` and `compsim show`."""
+"""What a store says of its studies and jobs: ends, promises, regimes, damage; status and show."""
 
 import json
 import shlex
-from pathlib import Path
 
 import pytest
 from conftest import write_cases
+from made_jobs import SHORT, fill, study
 
-from compressor.cases.load import load_studies
+from compressor.metrics import NUMBERS, QUANTILES
+from compressor.outcome import REGIME_WORDS, Regime
+from compressor.store.reader import open_study, read_store
 from compressor.store.status import report_job, standings
-from compressor.sweep.sweep import sweep
 
-SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
-MIX = {
-    "joint": "both",
-    "clearance_mm": [0.1, 0.2],
-    "solve": SHORT | {"max_steps": [5, 10**6]},
-    "output": {"keep": "metrics"},
-}
+BRIEF = {"duration_rev": 3.2, "settle_rev": 0.2, "output_step_deg": 0.9}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A folder with a study of four jobs: one is chaotic, one kept its promise, two failed."""
+    folder = tmp_path_factory.mktemp("ring")
+    values = {"clearance_mm": 0.3, "machine": {"rod_mass_kg": 1, "speed_rpm": 1000}}
+    damping = {"damping_N_s_per_mm": [0, 336]}
+    solve, output = {**BRIEF, "max_steps": [5, 10**6]}, {"keep": "metrics"}
+    fill(folder, study("ring", solve, joint="big_end", contact=damping, output=output, **values))
+    return folder
+
+
+def test_promise_and_regime_of_each_job_are_kept(whole):
+    found = open_study(whole)
+    assert found["regime"].values.tolist() == [["", ""], ["chaotic", "periodic"]]
+    assert found["promise"].values.tolist() == [["none", "none"], ["none", "kept"]]
+    for key, regime in zip(found["key"].values.flat, found["regime"].values.flat, strict=True):
+        assert read_store(whole).job(key).attrs["regime"] == regime
+
+
+def test_statistics_take_no_room_where_nothing_is_chaotic(whole, tmp_path):
+    fill(tmp_path, study("plain", output={"keep": "metrics"}))
+    assert read_store(tmp_path).given == {name for name, row in NUMBERS.items() if not row.when}
+    assert "quantile" not in open_study(tmp_path).dims
+    found = open_study(whole)
+    statistics = {name for name, row in NUMBERS.items() if row.when == "chaotic"}
+    assert statistics <= {*found.variables}
+    assert found["quantile"].values.tolist() == list(QUANTILES)
+    chaotic = found["regime"] == "chaotic"
+    assert (found["revolutions"].notnull() == chaotic).all()
+    assert float(found["revolutions"].where(chaotic).max()) == 3
+
+
+def test_status_counts_jobs_reasons_promises_and_regimes(whole, compsim):
+    (found,) = standings(whole)
+    assert (found.jobs, found.ok, found.failed, found.missing) == (4, 2, 2, 0)
+    assert found.reasons == {"budget_steps": 2}
+    assert found.promises == {"none": 1, "kept": 1}
+    assert found.regimes == {"chaotic": 1, "periodic": 1}
+    out = compsim("status", "-r", whole).out
+    assert max(map(len, out.splitlines())) <= 80
+    out = " ".join(out.split())
+    assert out.startswith("ring 4 jobs 2 ok 2 failed 0 missing")
+    assert "2 budget_steps: raise solve.max_steps" in out
+    reached = "1 without an accuracy target, 1 reached their accuracy target"
+    assert f"of those ok: {reached} of those ok" in out
+    for regime in ("chaotic", "periodic"):
+        assert f"of those ok: 1 {regime} ({REGIME_WORDS[Regime(regime)]})" in out
+    (told,) = json.loads(compsim("status", "-r", whole, "--json").out)
+    assert told["reasons"] == {"budget_steps": 2}
 
 
 @pytest.fixture
-def mix(tmp_path, monkeypatch, in_process):
-    """A study of four jobs of which two failed, one is ok and one is missing."""
-    monkeypatch.chdir(tmp_path)
-    only = "clearance_mm < 0.15 or solve.max_steps < 10"
-    (study,) = load_studies(*write_cases(tmp_path, mix=MIX), only=only)
-    sweep([study], tmp_path / "results", 1)
-    return study
-
-
-def test_status_counts_jobs_and_reasons(mix, compsim):
-    (found,) = standings("results")
-    assert (found.jobs, found.ok, found.failed, found.missing) == (4, 1, 2, 1)
-    assert found.reasons == {"budget_steps": 2}
-    out, err = compsim("status")
-    assert " ".join(out.split("\n")[0].split()) == "mix 4 jobs 1 ok 2 failed 1 missing"
-    assert "2 budget_steps: raise solve.max_steps" in out
-    assert f"next: compsim run {mix.path} -r results\n" == err
-    assert json.loads(compsim("status", "--json").out)[0]["reasons"] == {"budget_steps": 2}
+def mix(tmp_path):
+    """A folder with a study of a job that failed, one that is ok and one that is missing."""
+    made = study("mix", SHORT | {"max_steps": [5, 10**6, 10**7]}, joint="both", clearance_mm=0.1)
+    fill(tmp_path, made, skip=[2])
+    return tmp_path, made
 
 
 def test_show_tells_how_a_job_ended(mix, compsim):
-    by_end = {report_job("results", key).status: key for key in mix.keys}
-    assert by_end.keys() == {"ok", "failed", "missing"}
-    out = compsim("show", by_end["ok"][:12]).out
-    assert f"job {by_end['ok']}: ok" in out
-    assert "in mix clearance_mm=0.1 solve.max_steps=1000000" in out
-    out = compsim("show", by_end["failed"]).out
+    folder, made = mix
+    failed, ok, missing = made.keys
+    out = compsim("show", ok[:12], "-r", folder).out
+    assert f"job {ok}: ok" in out
+    assert "in mix solve.max_steps=1000000" in out
+    out = compsim("show", failed, "-r", folder).out
     assert "failed: budget_steps: more than 5 steps" in out
     assert "what to do: raise solve.max_steps" in out
     lines = [line.split() for line in out.split("\n")]
     (stopped,) = (words for words in lines if words[:1] == ["stopped"])
     assert 0 < float(stopped[2]) < 0.03
     assert float(stopped[4]) == pytest.approx(float(stopped[2]) * 3000, rel=1e-3)
-    out, err = compsim("show", by_end["missing"])
+    assert report_job(folder, missing).status == "missing"
+    out, err = compsim("show", missing, "-r", folder)
     assert "not run yet" in out
     assert err.startswith("next: compsim run ")
 
@@ -66,17 +100,19 @@ def test_the_next_run_has_the_same_jobs(tmp_path, monkeypatch, compsim, in_proce
     setting = ["--set", "joint=big_end", "--set=clearance_mm=[0.1, 0.2]"]
     command = ["run", "one case.yaml", "-j", "1", "--quiet", *setting]
     compsim(*command, "--only", "clearance_mm < 0.15")
+    assert standings("results")[0].missing == 1
     next_run = compsim("status").err.removeprefix("next: ").strip()
     compsim(*shlex.split(next_run)[1:], "--quiet", "-j", "1")
     assert standings("results")[0].missing == 0
 
 
 def test_damage_is_told_where_its_jobs_count_as_missing(mix, compsim):
-    paths = [*Path("results/batches").iterdir()]
+    folder, made = mix
+    paths = [*(folder / "batches").iterdir()]
     for path in paths:
         path.write_bytes(path.read_bytes()[:-1])
-    for words in (["status"], ["show", mix.keys[0]], ["status", "--json"]):
-        out, err = compsim(*words)
+    for words in (["status"], ["show", made.keys[0]], ["status", "--json"]):
+        out, err = compsim(*words, "-r", folder)
         assert "missing" in out or "not run yet" in out
         said = " ".join(err.split())
         assert all(said.count(f"{path.name}: is damaged") == 1 for path in paths)
