@@ -124,6 +124,7 @@ DIAMETERS = (
     (r"piston|cylinder|bore|^dia", "gas.bore_mm: {whole}"),
 )
 DIAMETER = re.compile(r"(?i)(\w*_)?(diameter|diametral|dia)(_\w*)?")
+BACK_AND_FORTH = re.compile(r"(\w*_)?(piston|crosshead|plunger|reciprocating)(_\w*)?_mass(_\w*)?")
 PERCENT = re.compile(r"(\w*_)?clearance(_\w*)?_(percent|pct)")
 TWICE = "stands in place of {}: give one of the two"
 
@@ -157,13 +158,17 @@ def expand_synonyms(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Pro
 def in_our_unit(name: str, value: Any, allowed: list[str]) -> str:
     """Return the hint at a key in another unit, such as "; write suction_MPa: 0.2"; or ""."""
     stem, _, unit = name.rpartition("_")
-    ours = f"{stem}_{OTHER_UNITS[unit][0]}" if stem and unit in OTHER_UNITS else ""
-    return f"; write {ours}: {convert_other(value, unit)}" if ours in allowed else ""
+    for known in (stem, stem.removesuffix("_pressure")) if unit in OTHER_UNITS else ():
+        if known and (ours := f"{known}_{OTHER_UNITS[unit][0]}") in allowed:
+            return f"; write {ours}: {convert_other(value, unit)}"
+    return ""
 
 
 def of_other_quantity(name: str, group: str, value: Any) -> str:
-    """Return the hint at a diameter, or at a cylinder's clearance in per cent; "" for neither."""
+    """Return the hint at a diameter, a part of a mass, or a clearance in per cent; "" for none."""
     is_near = group in ("", "machine", "gas")
+    if BACK_AND_FORTH.fullmatch(name) and is_near:
+        return "; write machine.reciprocating_mass_kg, of piston, its rod and crosshead together"
     if PERCENT.fullmatch(name) and is_near:
         return "; write gas.clearance_percent, a number or {head: 12, crank: 14}"
     for words, form in DIAMETERS if DIAMETER.fullmatch(name) else ():
