@@ -134,7 +134,9 @@ def faults(module, text):
 def circles(sources):
     """Modules that import each other in a ring."""
     wanted = {
-        module: {one for pair in imports(text) for one in (pair[0], ".".join(pair))} & {*sources}
+        module: {
+            inner if (inner := ".".join(pair)) in sources else pair[0] for pair in imports(text)
+        }
         for module, text in sources.items()
         if room(module) and module != f"compressor.{room(module)}"
     }

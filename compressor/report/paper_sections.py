@@ -10,27 +10,15 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import (
-    CLEARANCES,
-    FAULTS,
-    ORDER,
-    SPOKEN,
-    Claim,
-    cases_of,
-    claims,
-    label,
-    paper_cases,
-    settled_part,
-)
+from compressor import analysis, store
 from compressor.cases import Axis, Case
+from compressor.report import page, study_section
 from compressor.report.answer import last_case
 from compressor.report.figures import FIGURES, Figure
 from compressor.report.figures.pictures import draw_all
 from compressor.report.figures.sweep_data import measures
 from compressor.report.limits import NO_LIMITS, Limits
-from compressor.report.page import Section, SectionContent, ShownFigure, StudyNote, show_figure
-from compressor.report.study_section import file_name, jobs_table
-from compressor.store import DamagedFile, Folder, Stored, StoredStudy, StoreWarning, label_studies
+from compressor.store import Stored, StoredStudy
 from compressor.units import Units
 
 
@@ -46,14 +34,17 @@ class PaperRuns:
 def is_of_paper(stored: Stored, study: StoredStudy) -> bool:
     """Return whether all stored jobs of a study, and at least one, are cases of the paper."""
     count = sum(at >= 0 for at in stored.find([*study.keys]))
-    labels = {case.physics_key for case in paper_cases().values()}
+    labels = {case.physics_key for case in analysis.paper_cases().values()}
     return 0 < count == len(paper_candidates(stored, [study], labels))
 
 
 def repeats_paper(study: StoredStudy, paper: PaperRuns) -> bool:
     """Return whether all of a study is told as the paper's cases: whole faults, and no notes."""
     names = {name for name, run in paper.stored.items() if run.attrs["key"] in study.keys}
-    faults = [{label(fault, clearance) for clearance in CLEARANCES} for fault in FAULTS]
+    faults = [
+        {analysis.label(fault, clearance) for clearance in analysis.CLEARANCES}
+        for fault in analysis.FAULTS
+    ]
     is_whole = all(not fault & names or fault <= names for fault in faults)
     shown = {run.attrs["key"] for run in paper.stored.values()}
     return is_whole and shown.issuperset(study.keys) and not (study.title or study.notes)
@@ -70,8 +61,8 @@ def find_runs(
         name = labels[str(stored.words("physics_key")[stored.position(key)])]
         try:
             run = stored.job(key)
-        except DamagedFile as error:
-            warnings.warn(str(error), StoreWarning, stacklevel=2)
+        except store.DamagedFile as error:
+            warnings.warn(str(error), store.StoreWarning, stacklevel=2)
             damaged.add(name)
             continue
         if name not in found or rank(run) > rank(found[name]):
@@ -116,30 +107,30 @@ UNEQUAL = "whose runs do not settle at one crank angle, with fine samples of a w
 
 def own_figures(
     stored: Stored, study: StoredStudy, units: Units
-) -> tuple[StudyNote, list[Section]]:
+) -> tuple[page.StudyNote, list[page.Section]]:
     """Return the paper's figures and claims of the machine of a study's last job.
 
     A figure needs those of the paper's cases that it shows among the study's jobs. The note is on
     the study's section; there are no sections where nothing can be drawn.
     """
     case = last_case(stored, study)
-    runs = find_runs(stored, [study], cases_of(case)).usable if case else {}
+    runs = find_runs(stored, [study], analysis.cases_of(case)).usable if case else {}
     alike = comparable(runs.values())
     lacking = [one for one in PAPER.values() if not runs.keys() >= {*one.needs}]
     figures = draw_paper(runs, units, study.name) if alike else []
     if not figures:
         reason = "since no figure has all its cases there with series" if alike else UNEQUAL
         text = f"The paper's figures are not drawn of this machine, {reason}"
-        return StudyNote(text, file_name("jobs", study.name), "Its jobs"), []
+        return page.StudyNote(text, study_section.file_name("jobs", study.name), "Its jobs"), []
     numbers = ", ".join(one.title.partition(":")[0].removeprefix("Figure ") for one in lacking)
     why = f", but not Figures {numbers}, whose cases are not all there with series" * bool(lacking)
     text = f"The paper's figures and claims are drawn of this machine{why}"
-    anchor = file_name("figures", study.name)
-    return StudyNote(text, anchor, "Figures and claims"), [
-        Section(anchor, f"{study.name}: the paper's figures", SectionContent(figures=figures)),
-        Section(file_name("claims", study.name), f"{study.name}: the paper's claims", claims(runs),
-                "claims.html"),
-    ]  # fmt: skip
+    anchors = [study_section.file_name(what, study.name) for what in ("figures", "claims")]
+    titles = [f"{study.name}: the paper's {what}" for what in ("figures", "claims")]
+    return page.StudyNote(text, anchors[0], "Figures and claims"), [
+        page.Section(anchors[0], titles[0], page.SectionContent(figures=figures)),
+        page.Section(anchors[1], titles[1], analysis.claims(runs), "claims.html"),
+    ]
 
 
 def comparable(runs: Collection[xr.Dataset]) -> bool:
@@ -148,11 +139,11 @@ def comparable(runs: Collection[xr.Dataset]) -> bool:
     They settle at one crank angle and have samples at the same ones, for a revolution or more, and
     so close that the lines above `ORDER`, which claim 7 reads, are resolved.
     """
-    grids = [settled_part(run)["crank_angle"].values for run in runs]
+    grids = [analysis.settled_part(run)["crank_angle"].values for run in runs]
     if not grids:
         return True
     turns = (grids[0][-1] - grids[0][0]) / (2.0 * np.pi)
-    fine = grids[0].size - 1 > 2 * (ORDER + 1) * turns
+    fine = grids[0].size - 1 > 2 * (analysis.ORDER + 1) * turns
     return (
         turns > 1.0 - REVOLUTION_ROUNDING
         and fine
@@ -173,40 +164,42 @@ TO_GET = (
 
 def paper_sections(
     cases: xr.Dataset,
-    judged: Sequence[Claim],
+    judged: Sequence[analysis.Claim],
     caveats: Sequence[str],
     limits: Limits = NO_LIMITS,
     units: Units = "usual",
-) -> list[Section]:
+) -> list[page.Section]:
     """Return the paper's sections after its figures: claims and cases.
 
     cases: of `paper_data`; judged: the paper's claims; limits: of metrics, whose zones are shown.
     """
     words = [CASES, *limits.words(measures(cases, units))]
-    table = SectionContent(jobs_table(cases, limits, units), words, caveats)
+    table = page.SectionContent(study_section.jobs_table(cases, limits, units), words, caveats)
     return [
-        Section("claims", "The paper's claims", judged, "claims.html"),
-        Section("cases", "The paper's cases", table),
+        page.Section("claims", "The paper's claims", judged, "claims.html"),
+        page.Section("cases", "The paper's cases", table),
     ]
 
 
 def paper_data(stored: Stored, paper: PaperRuns) -> xr.Dataset:
     """Return the paper's cases as one study of eleven jobs, as `open_study` does."""
-    names = [*paper_cases()]
+    names = [*analysis.paper_cases()]
     keys = [paper.stored[name].attrs["key"] if name in paper.stored else "" for name in names]
     axis = Axis("case", tuple(map(label_in_words, names)))
     fixed = Case.from_values({}).values()
     study = StoredStudy("paper", "", (axis,), tuple(keys), fixed, "", {}, "")
-    return label_studies(stored, [study])
+    return store.label_studies(stored, [study])
 
 
 def label_in_words(name: str) -> str:
     """Return a label of `paper_cases` in words."""
     fault, _, clearance = name.partition(" ")
-    return f"{SPOKEN[fault]}, {clearance} mm" if clearance else f"{fault} model, no clearance"
+    return (
+        f"{analysis.SPOKEN[fault]}, {clearance} mm" if clearance else f"{fault} model, no clearance"
+    )
 
 
-def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
+def missing_sections(paper: PaperRuns, results: store.Folder) -> Iterator[page.Section]:
     """Yield the figures that could not be drawn, what they lack, and how to get it."""
     lacking = {
         item.title: [name for name in item.needs if name in paper.absent] for item in PAPER.values()
@@ -219,21 +212,25 @@ def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
     ]
     if figures:
         command = f"compsim run paper.yaml -r {shlex.quote(str(results))}"
-        content = SectionContent(None, [TO_GET.format(command=command)], figures)
-        yield Section("missing", "Figures that could not be drawn", content)
+        content = page.SectionContent(None, [TO_GET.format(command=command)], figures)
+        yield page.Section("missing", "Figures that could not be drawn", content)
 
 
-def draw_paper(runs: Mapping[str, xr.Dataset], units: Units, study: str = "") -> list[ShownFigure]:
+def draw_paper(
+    runs: Mapping[str, xr.Dataset], units: Units, study: str = ""
+) -> list[page.ShownFigure]:
     """Return every figure of the paper whose cases are there; study: whose machine it is, if any.
 
     Copies of this process make all of them, since their numbers take as long as their pictures.
     """
 
-    def show(one: Figure) -> ShownFigure:
+    def show(one: Figure) -> page.ShownFigure:
         drawn = one.make(runs, units=units)
         if study:
-            drawn = drawn._replace(name=file_name(study, one.name), title=f"{study}: {one.title}")
-        return show_figure(drawn)
+            drawn = drawn._replace(
+                name=study_section.file_name(study, one.name), title=f"{study}: {one.title}"
+            )
+        return page.show_figure(drawn)
 
     known = [one for one in PAPER.values() if runs.keys() >= {*one.needs}]
     return draw_all([partial(show, one) for one in known])

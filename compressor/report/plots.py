@@ -10,16 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 import xarray as xr
 
-from compressor.analysis import (
-    SPOKEN,
-    NoSeriesError,
-    case_of,
-    healthy_twin,
-    joints_with_clearance,
-    read_cycle,
-    shaking,
-)
-from compressor.cases import points, row_of, with_ideal_joints
+from compressor import analysis, cases, store
 from compressor.metrics import JOINTS
 from compressor.program import CompsimError
 from compressor.reasons import remedy
@@ -29,19 +20,7 @@ from compressor.report.figures.pictures import render
 from compressor.report.figures.sweep_data import name_in_words, shown_value
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.study_section import file_name
-from compressor.store import (
-    DamagedFile,
-    Folder,
-    Stored,
-    StoredStudy,
-    coordinate_names,
-    find_axis,
-    find_job,
-    find_value,
-    publish,
-    read_store,
-    read_studies,
-)
+from compressor.store import Stored, StoredStudy
 from compressor.units import Units, read_quantity, split_number
 
 
@@ -81,14 +60,14 @@ def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tup
 def write_figure(path: Path, figure: go.Figure) -> Path:
     """Write a figure as its path ends, .png, .svg or .csv; return the path. Raises StoreError."""
     kind = path.suffix[1:]
-    publish(path, as_csv(figure).encode() if kind == "csv" else render(figure, kind))
+    store.publish(path, as_csv(figure).encode() if kind == "csv" else render(figure, kind))
     return path
 
 
 JOB, STUDY = FIGURES["job"], FIGURES["study"]
 JOINT_WORDS = {
     "none": "no clearance", "both": "clearance at both joints",
-    **{joint: f"clearance at the {SPOKEN[joint]}" for joint in JOINTS},
+    **{joint: f"clearance at the {analysis.SPOKEN[joint]}" for joint in JOINTS},
 }  # fmt: skip
 TITLE_WIDTH = 105  # letters of a line of a figure's title
 MAX_ROWS = 200  # of a map
@@ -97,7 +76,7 @@ KEEP = "run it again with --set output.keep=series"
 
 
 def write_plots(
-    results: Folder, output: Folder, words: Sequence[str], choice: PlotChoice
+    results: store.Folder, output: store.Folder, words: Sequence[str], choice: PlotChoice
 ) -> Iterator[tuple[Path, str]]:
     """Draw a study by its name, or a job by the words that `show` takes; yield files and captions.
 
@@ -106,14 +85,14 @@ def write_plots(
     PlotError where it cannot be drawn; StoreError where the store cannot be read or the files not
     be written.
     """
-    stored, studies = read_store(results, warn=True), read_studies(results)
+    stored, studies = store.read_store(results, warn=True), store.read_studies(results)
     named = {study.name: study for study in studies}
     of_job = bool(choice.what) and {*choice.what} <= {*JOB}
     if len(words) == 1 and words[0] in named and not (of_job and named[words[0]].jobs == 1):
         drawn = draw_study(stored, named[words[0]], choice)
         stem = words[0]
     else:
-        key = find_job(results, words, studies, stored.keys())
+        key = store.find_job(results, words, studies, stored.keys())
         drawn = job_figures(stored, studies, key, choice)
         stem = key[:KEY_DIGITS]
     for one in drawn:
@@ -130,10 +109,10 @@ def job_figures(
         raise PlotError(f"{key} is one job: --over, --at and --limit are for studies")
     run = drawable(stored, studies, key)
     try:
-        worn = bool(joints_with_clearance(run))
+        worn = bool(analysis.joints_with_clearance(run))
     except ValueError:
         worn = False
-    has = {"clearance": worn, "gas": case_of(run).load == "gas"}
+    has = {"clearance": worn, "gas": analysis.case_of(run).load == "gas"}
     why = {
         "clearance": "has ideal joints",
         "gas": "has no gas in its cylinder: cards are of load: gas",
@@ -141,14 +120,14 @@ def job_figures(
     for name in choice.what:
         for lack in (need for need in JOB[name].needs if not has[need]):
             raise PlotError(f"job {key} {why[lack]}, so that there is no figure {name!r} of it")
-    twin = healthy_twin(run) if worn else None
+    twin = analysis.healthy_twin(run) if worn else None
     try:
         for name in figures:
             if all(has[need] for need in JOB[name].needs):
                 shown = JOB[name].make(run, twin, units=choice.units)
                 shown.figure.layout.title = job_title(studies, key, shown.title)
                 yield shown
-    except NoSeriesError as error:
+    except analysis.NoSeriesError as error:
         raise PlotError(f"job {key}: {error}") from error
 
 
@@ -201,7 +180,7 @@ def job_title(studies: Sequence[StoredStudy], key: str, what: str) -> str:
     """Return the title of a job's figure: its study, what is drawn, its place in the sweep."""
     for study in sorted(studies, key=lambda one: one.is_trial):  # a search may share the job
         if key in study.keys:
-            point = [*points(study)][study.keys.index(key)]
+            point = [*cases.points(study)][study.keys.index(key)]
             values = [f"{axis} {shown_value(value)}" for axis, value in point.items()]
             return title_figure(
                 study.title or study.name, what, [*values, f"job {key[:KEY_DIGITS]}"]
@@ -228,9 +207,9 @@ def title_figure(machine: str, what: str, parts: Sequence[str] = ()) -> str:
 
 def axis_words(key: str) -> str:
     """Return the title of an axis of a study: its name and unit, such as clearance (mm)."""
-    row = row_of(key)
+    row = cases.row_of(key)
     unit = (row.unit if row else "") or ""
-    name = name_in_words(coordinate_names([key])[key], unit)
+    name = name_in_words(store.coordinate_names([key])[key], unit)
     return f"{name} ({unit})" if unit else name
 
 
@@ -269,10 +248,10 @@ def with_segments(
         if run is None or "sensor_segment_rms" not in run:
             found.append(row)
             continue
-        case = case_of(run)
-        one = with_ideal_joints(case).key
+        case = analysis.case_of(run)
+        one = cases.with_ideal_joints(case).key
         if one not in healthy:
-            twin = healthy_twin(run)
+            twin = analysis.healthy_twin(run)
             if twin is None:
                 raise PlotError("the same machine without clearance, whose levels limits are times "
                                 "of, does not run to its end")  # fmt: skip
@@ -303,8 +282,8 @@ def draw_for_page(stored: Stored, study: StoredStudy, units: Units) -> Iterator[
         yield shown._replace(title=title, note=drawn)
     loudest = max(known, key=lambda n: np.abs(known[n].vibration).max())
     run = stored.job(jobs[loudest][1])
-    case = case_of(run)
-    twin = healthy_twin(run) if case.joint != "none" else None
+    case = analysis.case_of(run)
+    twin = analysis.healthy_twin(run) if case.joint != "none" else None
     value = f"{over} {rows[loudest].value}" if jobs[loudest][0] != "" else rows[loudest].value
     shown = JOB["analyst"].make(run, twin, units=units)
     note = " It is the job with the greatest vibration of these." if len(known) > 1 else ""
@@ -342,17 +321,17 @@ def nothing_to_draw(stored: Stored, study: StoredStudy, rows: Sequence[SweptRow]
     return f"no job of {study.name} can be drawn: {text}"
 
 
-def choose_axis(folder: Folder, study: StoredStudy, name: str) -> str:
+def choose_axis(folder: store.Folder, study: StoredStudy, name: str) -> str:
     """Return the key of the axis that is meant: by default a clearance, the speed, or the first."""
     if name:
-        return find_axis(folder, study, name).key
+        return store.find_axis(folder, study, name).key
     keys = [axis.key for axis in study.axes]
     ranked = [key for word in ("clearance", "speed") for key in keys if word in key]
     return (ranked or keys or ["job"])[0]
 
 
 def select_jobs(
-    folder: Folder, study: StoredStudy, over: str, at: Sequence[str], most: int
+    folder: store.Folder, study: StoredStudy, over: str, at: Sequence[str], most: int
 ) -> tuple[list[tuple[Any, str]], list[str]]:
     """Return (value, key) of the jobs along an axis in its order, and the other axes in words.
 
@@ -360,7 +339,7 @@ def select_jobs(
     """
     fixed = {}
     for text in at:
-        key, value = find_value(folder, study, text)
+        key, value = store.find_value(folder, study, text)
         if key == over:
             raise PlotError(f"--at {text}: needs key=value of an axis other than {over}")
         fixed[key] = value
@@ -369,7 +348,7 @@ def select_jobs(
         fixed = first | fixed
     jobs = [
         (point.get(over, ""), key)
-        for point, key in zip(points(study), study.keys, strict=True)
+        for point, key in zip(cases.points(study), study.keys, strict=True)
         if all(point.get(name) == value for name, value in fixed.items())
     ]
     if not jobs:
@@ -389,7 +368,7 @@ def spell_where(where: Sequence[str]) -> str:
     return f" Here {'; '.join(where)}." if where else ""
 
 
-READ = {"cycle": read_cycle, "shaking": shaking}  # parts of a `SweptRow`
+READ = {"cycle": analysis.read_cycle, "shaking": analysis.shaking}  # parts of a `SweptRow`
 
 
 def swept_row(stored: Stored, value: Any, key: str, parts: Collection[str] = (*READ,)) -> SweptRow:
@@ -402,8 +381,8 @@ def swept_row(stored: Stored, value: Any, key: str, parts: Collection[str] = (*R
     try:
         run = stored.job(key)
         found: dict[str, Any] = {part: READ[part](run) for part in parts}
-    except DamagedFile:
+    except store.DamagedFile:
         return SweptRow(name, problem="damaged")
-    except NoSeriesError:
+    except analysis.NoSeriesError:
         return SweptRow(name, problem="too short")
     return SweptRow(name, **found, chaotic=run.attrs.get("regime") == "chaotic")

@@ -16,69 +16,19 @@ from typing import NamedTuple
 import xarray as xr
 from plotly.offline import get_plotlyjs
 
-from compressor.analysis import Claim, claims, paper_cases
+from compressor import analysis, store
 from compressor.cases import CardError
 from compressor.outcome import Regime
 from compressor.program import CompsimWarning
-from compressor.report.answer import (
-    MAX_FINDINGS,
-    FirstScreen,
-    MetricChange,
-    StudyLine,
-    answer_section,
-    assumptions_section,
-    choose_findings,
-    provenance_section,
-    study_findings,
-    worn_joints,
-)
+from compressor.report import answer, interactive, page, paper_sections, study_section
 from compressor.report.figures import FIGURES
 from compressor.report.figures.pictures import draw_all
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.figures.sweep_data import measures
 from compressor.report.figures.table import DrawnFigure
-from compressor.report.interactive import job_scripts, series_name
 from compressor.report.limits import Limits, read_limits
-from compressor.report.page import (
-    JobFacts,
-    JobsToOpen,
-    Section,
-    SectionContent,
-    ShownFigure,
-    StudyNote,
-    document,
-    show_figure,
-)
-from compressor.report.paper_sections import (
-    draw_paper,
-    find_runs,
-    is_of_paper,
-    missing_sections,
-    own_figures,
-    paper_data,
-    paper_sections,
-    repeats_paper,
-)
 from compressor.report.plots import draw_for_page
-from compressor.report.study_section import (
-    MAX_ROWS,
-    file_name,
-    job_counts,
-    job_facts,
-    study_sections,
-)
-from compressor.store import (
-    Folder,
-    Stored,
-    StoredStudy,
-    find_study,
-    label_studies,
-    publish,
-    read_store,
-    read_studies,
-    run_caveats,
-    study_caveats,
-)
+from compressor.store import Stored, StoredStudy
 from compressor.units import Units
 
 LIBRARY = "plotly.min.js"
@@ -86,8 +36,8 @@ KINDS = ("png", "csv", "js")  # of files beside the page
 
 
 def write_report(
-    results: Folder,
-    report: Folder,
+    results: store.Folder,
+    report: store.Folder,
     command: str = "",
     limits: Sequence[str] = (),
     units: Units = "usual",
@@ -106,19 +56,21 @@ def write_report(
     """
     folder, zones = Path(report), read_limits(limits, units)
     contents = build_report(results, command, zones, units, studies)
-    files = {f"{series_name(key)}.js": text.encode() for key, text in contents.series.items()}
+    files = {
+        f"{interactive.series_name(key)}.js": text.encode() for key, text in contents.series.items()
+    }
     drawn = [one for one in contents.figures if isinstance(one, DrawnFigure)]
-    shown = [one for one in contents.figures if isinstance(one, ShownFigure)]
-    for made in [*shown, *draw_all([partial(show_figure, one) for one in drawn])]:
+    shown = [one for one in contents.figures if isinstance(one, page.ShownFigure)]
+    for made in [*shown, *draw_all([partial(page.show_figure, one) for one in drawn])]:
         files |= made.files
     library = {LIBRARY: get_plotlyjs().encode()}
     if single:
-        page = contents.page(library | files)
-        publish(folder, page.encode(errors="backslashreplace"))
+        text = contents.page(library | files)
+        store.publish(folder, text.encode(errors="backslashreplace"))
         return folder
     for name, content in (library | files).items():
-        publish(folder / name, content, durable=False)  # the same command makes it again
-    publish(folder / "index.html", contents.page({}).encode(errors="backslashreplace"))
+        store.publish(folder / name, content, durable=False)  # the same command makes it again
+    store.publish(folder / "index.html", contents.page({}).encode(errors="backslashreplace"))
     remove_stale(folder, contents)
     return folder / "index.html"
 
@@ -130,24 +82,30 @@ class ReportContent(NamedTuple):
     it is given.
     """
 
-    figures: list[DrawnFigure | ShownFigure]
+    figures: list[DrawnFigure | page.ShownFigure]
     studies: list[str]
     series: dict[str, str]
     page: Callable[[Mapping[str, bytes]], str]
 
 
 def build_report(
-    results: Folder, command: str, limits: Limits, units: Units = "usual", names: Sequence[str] = ()
+    results: store.Folder,
+    command: str,
+    limits: Limits,
+    units: Units = "usual",
+    names: Sequence[str] = (),
 ) -> ReportContent:
     """Return the figures, series and page of a report, in memory; arguments as `write_report`."""
-    studies, stored = choose_studies(results, names), read_store(results, warn=True)
+    studies, stored = choose_studies(results, names), store.read_store(results, warn=True)
     # a few like runs in a sweep of one's own are no reproduction
-    papers = [study for study in studies if is_of_paper(stored, study)]
-    paper = find_runs(stored, papers, paper_cases())
-    paper_figures = draw_paper(paper.usable, units)
-    of_own = {one.name: own_figures(stored, one, units) for one in studies if one.figures}
+    papers = [study for study in studies if paper_sections.is_of_paper(stored, study)]
+    paper = paper_sections.find_runs(stored, papers, analysis.paper_cases())
+    paper_figures = paper_sections.draw_paper(paper.usable, units)
+    of_own = {
+        one.name: paper_sections.own_figures(stored, one, units) for one in studies if one.figures
+    }
     own_notes = {name: note for name, (note, _) in of_own.items()}
-    own = [study for study in studies if not repeats_paper(study, paper)]
+    own = [study for study in studies if not paper_sections.repeats_paper(study, paper)]
     drawn: list[DrawnStudy] = []
     left_out: dict[str, str] = {}  # study -> why
     for study in own:
@@ -159,43 +117,49 @@ def build_report(
             warnings.warn(left_out[study.name], CompsimWarning, stacklevel=3)
     own = [study for study in own if study.name not in left_out]
     shown = {name for one in drawn for name in one.shown}
-    cases, judged, tables = None, list[Claim](), list[Section]()
+    cases, judged, tables = None, list[analysis.Claim](), list[page.Section]()
     if paper.stored:
-        cases, judged = paper_data(stored, paper), claims(paper.usable)
+        cases, judged = paper_sections.paper_data(stored, paper), analysis.claims(paper.usable)
         shown |= {one.variable for one in measures(cases)}
-        caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored, one)]
-        tables = paper_sections(cases, judged, caveats, limits, units)
+        caveats = [f"{one.name}: {t}" for one in papers for t in store.study_caveats(stored, one)]
+        tables = paper_sections.paper_sections(cases, judged, caveats, limits, units)
     for name in limits.by_metric.keys() - shown:
         text = f"no study of this report has {name}: its limits are shown nowhere"
         warnings.warn(text, CompsimWarning, stacklevel=3)
-    of_paper = Section("figures", "The paper's figures", SectionContent(figures=paper_figures))
+    of_paper = page.Section(
+        "figures", "The paper's figures", page.SectionContent(figures=paper_figures)
+    )
     sections = [
-        answer_section(summarise(own, cases, judged, drawn, [*left_out.values()], units)),
+        answer.answer_section(summarise(own, cases, judged, drawn, [*left_out.values()], units)),
         *(one.section for one in drawn),
         *[of_paper] * bool(paper_figures),
         *chain(*(sections for _, sections in of_own.values())),
         *(one.table for one in drawn),
         *tables,
-        assumptions_section(bool(paper.stored)),
-        *(missing_sections(paper, results) if papers else ()),
-        provenance_section(studies, results, command),
+        answer.assumptions_section(bool(paper.stored)),
+        *(paper_sections.missing_sections(paper, results) if papers else ()),
+        answer.provenance_section(studies, results, command),
     ]
-    series = {key: text for one in drawn for key, text in job_scripts(stored, one.jobs.jobs, units)}
-    jobs = JobsToOpen(shlex.quote(str(results)), [one.jobs for one in drawn], [*series])
+    series = {
+        key: text
+        for one in drawn
+        for key, text in interactive.job_scripts(stored, one.jobs.jobs, units)
+    }
+    jobs = page.JobsToOpen(shlex.quote(str(results)), [one.jobs for one in drawn], [*series])
     titled = [study for study in studies if study.title]
     titles = {study.title for study in titled if not study.is_trial or titled[0].is_trial}
     title = titles.pop() if len(titles) == 1 else ""  # several machines have it in their sections
     figures = [one for section in sections for one in getattr(section.content, "figures", ())]
-    page = partial(document, sections, jobs, title)
-    return ReportContent(figures, [study.name for study in studies], series, page)
+    make_page = partial(page.document, sections, jobs, title)
+    return ReportContent(figures, [study.name for study in studies], series, make_page)
 
 
-def choose_studies(results: Folder, names: Sequence[str]) -> list[StoredStudy]:
+def choose_studies(results: store.Folder, names: Sequence[str]) -> list[StoredStudy]:
     """Return the studies of some names, or all, those of searches last. Raises WrongName."""
     if not names:
-        return sorted(read_studies(results), key=lambda study: study.is_trial)
-    known = read_studies(results)
-    return [find_study(results, name, known) for name in dict.fromkeys(names)]
+        return sorted(store.read_studies(results), key=lambda study: study.is_trial)
+    known = store.read_studies(results)
+    return [store.find_study(results, name, known) for name in dict.fromkeys(names)]
 
 
 class DrawnStudy(NamedTuple):
@@ -205,87 +169,106 @@ class DrawnStudy(NamedTuple):
     shown: the metrics that its table has.
     """
 
-    section: Section
-    table: Section
-    findings: list[MetricChange]
-    line: StudyLine
-    jobs: JobFacts
+    section: page.Section
+    table: page.Section
+    findings: list[answer.MetricChange]
+    line: answer.StudyLine
+    jobs: page.JobFacts
     cautions: list[str]
     shown: set[str]
 
 
 def drawn_study(
-    stored: Stored, study: StoredStudy, notes: Sequence[StudyNote], limits: Limits, units: Units
+    stored: Stored,
+    study: StoredStudy,
+    notes: Sequence[page.StudyNote],
+    limits: Limits,
+    units: Units,
 ) -> DrawnStudy:
     """Return a study, with figures of it unless the paper's are drawn; notes: lines on it."""
-    with label_studies(stored, [study]) as data:
+    with store.label_studies(stored, [study]) as data:
         named: list[tuple[str, DrawnFigure]] = []
         if not study.figures:
             swept, turns = draw_sweep(data, limits, units), draw_for_page(stored, study, units)
-            named = [(file_name("sweep", study.name, one.name), one) for one in swept]
-            named += [(file_name(one.name, study.name), one) for one in turns]
+            named = [(study_section.file_name("sweep", study.name, one.name), one) for one in swept]
+            named += [(study_section.file_name(one.name, study.name), one) for one in turns]
         figures = [one._replace(name=name, title=f"{study.name}: {one.title}")
                    for name, one in named]  # fmt: skip
-        section, table = study_sections(stored, study, data, figures, notes, limits, units)
-        keys = [*(key for one in figures for key in one.jobs), *study.keys[:MAX_ROWS]]
+        section, table = study_section.study_sections(
+            stored, study, data, figures, notes, limits, units
+        )
+        keys = [
+            *(key for one in figures for key in one.jobs),
+            *study.keys[: study_section.MAX_ROWS],
+        ]
         line = describe_run(f"Study {study.name}", section.anchor, data)
         return DrawnStudy(
-            section, table, study_findings(data, units), line, job_facts(data, keys),
-            motion_cautions(stored, study, data), {one.variable for one in measures(data)},
+            section, table, answer.study_findings(data, units), line,
+            study_section.job_facts(data, keys), motion_cautions(stored, study, data),
+            {one.variable for one in measures(data)},
         )  # fmt: skip
 
 
-def describe_run(name: str, anchor: str, data: xr.Dataset) -> StudyLine:
+def describe_run(name: str, anchor: str, data: xr.Dataset) -> answer.StudyLine:
     """Return what was run, and how it ended; anchor: of its section."""
-    counts = job_counts(data)
-    return StudyLine(name, anchor, counts.text, bool(counts.failed), bool(counts.ok))
+    counts = study_section.job_counts(data)
+    return answer.StudyLine(name, anchor, counts.text, bool(counts.failed), bool(counts.ok))
 
 
 def motion_cautions(stored: Stored, study: StoredStudy, data: xr.Dataset) -> list[str]:
     """Return which of a study's jobs are chaotic or have not settled, a sentence each."""
     chaotic = int((data["regime"].values == Regime.CHAOTIC).sum())
-    of_knock = "; knock is a mean over their revolutions" if worn_joints(data) else ""
+    of_knock = "; knock is a mean over their revolutions" if answer.worn_joints(data) else ""
     texts = [
         f"{chaotic} of {study.jobs} jobs are chaotic, and their peaks do not count here{of_knock}"
     ]
-    found = [*texts[: chaotic > 0], *run_caveats(stored, study)]
+    found = [*texts[: chaotic > 0], *store.run_caveats(stored, study)]
     return [f"Study {study.name}: {text}." for text in found]
 
 
 def summarise(
     own: Sequence[StoredStudy],
     cases: xr.Dataset | None,
-    judged: Sequence[Claim],
+    judged: Sequence[analysis.Claim],
     drawn: Sequence[DrawnStudy],
     left_out: Sequence[str],
     units: Units = "usual",
-) -> FirstScreen:
+) -> answer.FirstScreen:
     """Return the page's first screen.
 
     cases: of the paper, as of `paper_data`; judged: its claims; left_out: studies, and why.
     """
     lines = [one.line for one in drawn]
     told = [one for study, one in zip(own, drawn, strict=True) if not study.is_trial] or drawn
-    each: list[tuple[str, Sequence[MetricChange]]] = [(one.line.name, one.findings) for one in told]
+    each: list[tuple[str, Sequence[answer.MetricChange]]] = [
+        (one.line.name, one.findings) for one in told
+    ]
     if cases is not None:
         lines.append(describe_run("The paper's cases", "cases", cases))
         worn = cases.isel(case=slice(1, None))  # and the design model; the first is the typical one
-        each.append(("The paper's cases", study_findings(worn, units)))
-    count = MAX_FINDINGS if len(each) == 1 else 1
-    shown = [(name, chosen) for name, found in each if (chosen := choose_findings(found, count))]
+        each.append(("The paper's cases", answer.study_findings(worn, units)))
+    count = answer.MAX_FINDINGS if len(each) == 1 else 1
+    shown = [
+        (name, chosen) for name, found in each if (chosen := answer.choose_findings(found, count))
+    ]
     cautions = [f"{text[0].upper()}{text[1:]}." for text in left_out]
     cautions += [text for one in drawn for text in one.cautions]
-    return FirstScreen(lines, shown, judged, cautions)
+    return answer.FirstScreen(lines, shown, judged, cautions)
 
 
 def remove_stale(report: Path, contents: ReportContent) -> None:
     """Remove what an earlier report drew and this one did not: the paper's figures, and series."""
     drawn = {one.name for one in contents.figures}
-    own = (file_name(study, name) for study in contents.studies for name in FIGURES["paper"])
+    own = (
+        study_section.file_name(study, name)
+        for study in contents.studies
+        for name in FIGURES["paper"]
+    )
     names = {*FIGURES["paper"], *own} - drawn
     stale = [report / f"{name}.{kind}" for name in names for kind in KINDS]
-    scripts = {f"{series_name(key)}.js" for key in contents.series}
-    stale += [path for path in report.glob(f"{series_name('*')}.js") if path.name not in scripts]
+    scripts = {f"{interactive.series_name(key)}.js" for key in contents.series}
+    before = report.glob(f"{interactive.series_name('*')}.js")
+    stale += [path for path in before if path.name not in scripts]
     for path in stale:
         with contextlib.suppress(OSError):
             path.unlink()

@@ -9,18 +9,10 @@ from compressor.analysis import healthy_twin
 from compressor.cases import Case, stands_for
 from compressor.digits import is_known
 from compressor.metrics import BARRED
+from compressor.report import page
 from compressor.report.answer import FORCE, name_jobs
 from compressor.report.figures.drawing import thin_places
 from compressor.report.figures.sweep_data import MEASURES, Measure, measures, swept_values
-from compressor.report.page import (
-    Cell,
-    PageTable,
-    TableRow,
-    column_title,
-    format_measure,
-    number,
-    unbroken,
-)
 from compressor.store import Stored
 from compressor.units import Units
 
@@ -35,7 +27,7 @@ class HealthyAndWorn:
     """The table of a machine without clearance and of its worn jobs, and what it says."""
 
     words: str
-    table: PageTable
+    table: page.PageTable
 
 
 def compare_healthy(
@@ -118,23 +110,26 @@ def _compare(
         if np.isnan(sound) or BARRED[measure.variable].contact:
             continue
         values, bars = measure.of(data).ravel(), measure.bar(data).ravel()
-        cells = [Cell(column_title(measure)), Cell(number(sound), "number", sound)]
+        cells = [
+            page.Cell(page.column_title(measure)),
+            page.Cell(page.number(sound), "number", sound),
+        ]
         cells += [_cell(measure, float(values[n]), float(bars[n]), sound) for n in places]
-        rows.append(TableRow(cells))
+        rows.append(page.TableRow(cells))
     heads = [names[n] or "this job" for n in places]
     words = (
         "The machine without clearance, by the same model: its joints are ideal, also without oil "
         "film; a sound bearing has some clearance. "
         f"Beside it {beside}. In parentheses: how many times as much as without clearance."
     )
-    return HealthyAndWorn(words, PageTable(["metric", "without clearance", *heads], rows))
+    return HealthyAndWorn(words, page.PageTable(["metric", "without clearance", *heads], rows))
 
 
-def _cell(measure: Measure, value: float, bar: float, sound: float) -> Cell:
+def _cell(measure: Measure, value: float, bar: float, sound: float) -> page.Cell:
     """Return a metric of a worn job, and how many times that of the healthy machine it is."""
-    text = unbroken(format_measure(measure, value, bar))
+    text = page.unbroken(page.format_measure(measure, value, bar))
     is_sure = np.isnan(bar) or is_known(value, bar, measure.is_relative)
     if is_sure and sound > 0.0 and value > 0.0:
         times = value / sound
         text += f" ({times:.2f}×)" if times < 9.995 else f" ({times:.3g}×)"
-    return Cell(text, "number", None if np.isnan(value) else value)
+    return page.Cell(text, "number", None if np.isnan(value) else value)

@@ -11,23 +11,11 @@ import xarray as xr
 from compressor.digits import plural
 from compressor.outcome import Regime, regime_words
 from compressor.reasons import remedy
+from compressor.report import page
 from compressor.report.figures.sweep_data import measures, swept_values
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.inputs import Lines, find_inputs
 from compressor.report.limits import NO_LIMITS, Limits
-from compressor.report.page import (
-    Cell,
-    JobFacts,
-    PageTable,
-    Section,
-    SectionContent,
-    StudyNote,
-    column_title,
-    job_row,
-    measured_cell,
-    status_text,
-    value_cell,
-)
 from compressor.report.side_by_side import HealthyAndWorn, compare_healthy
 from compressor.store import Stored, StoredStudy, study_caveats
 from compressor.units import Units
@@ -69,7 +57,7 @@ class StudyContent:
     remedies: Sequence[str]
     figures: Sequence[DrawnFigure]
     jobs: str
-    notes: Sequence[StudyNote] = ()
+    notes: Sequence[page.StudyNote] = ()
     beside: HealthyAndWorn | None = None
     inputs: Sequence[tuple[str, Lines]] = ()
 
@@ -79,10 +67,10 @@ def study_sections(
     study: StoredStudy,
     data: xr.Dataset,
     figures: Sequence[DrawnFigure],
-    notes: Sequence[StudyNote] = (),
+    notes: Sequence[page.StudyNote] = (),
     limits: Limits = NO_LIMITS,
     units: Units = "usual",
-) -> tuple[Section, Section]:
+) -> tuple[page.Section, page.Section]:
     """Return the sections of a study as `open_study` gives it: figures and failures, and table.
 
     notes: lines that others add to the first; limits: of metrics, whose zones the table shows.
@@ -113,8 +101,8 @@ def study_sections(
         "series are stored, its acceleration and its contact forces.",
     ]
     return (
-        Section(file_name("study", study.name), f"Study {study.name}", content, "study.html"),
-        Section(anchor, f"Jobs of study {study.name}", SectionContent(table, paragraphs)),
+        page.Section(file_name("study", study.name), f"Study {study.name}", content, "study.html"),
+        page.Section(anchor, f"Jobs of study {study.name}", page.SectionContent(table, paragraphs)),
     )
 
 
@@ -130,7 +118,7 @@ def job_counts(data: xr.Dataset) -> Counts:
     return Counts(status.size - failed - missing, failed, missing)
 
 
-def job_facts(data: xr.Dataset, keys: Sequence[str]) -> JobFacts:
+def job_facts(data: xr.Dataset, keys: Sequence[str]) -> page.JobFacts:
     """Return what a click on a job's point shows: its place in the sweep, and how it ended.
 
     keys: of the jobs; only the first MAX_FACTS are shown.
@@ -141,9 +129,9 @@ def job_facts(data: xr.Dataset, keys: Sequence[str]) -> JobFacts:
     found = {}
     for key in [key for key in dict.fromkeys(keys) if key in place][:MAX_FACTS]:
         n = place[key]
-        point = [value_cell(values[n]).text for values in swept.values()]
-        found[key] = [*point, status_text(status[n], reason[n])]
-    return JobFacts([*swept, "status"], found)
+        point = [page.value_cell(values[n]).text for values in swept.values()]
+        found[key] = [*point, page.status_text(status[n], reason[n])]
+    return page.JobFacts([*swept, "status"], found)
 
 
 def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
@@ -155,15 +143,17 @@ def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
         position = stored.position(str(data["key"].values.flat[place]))
         text = "gone"
         if position is not None:
-            text = status_text(stored.status_at(position).reason, stored.detail(position))
-        point = [f"{name} {value_cell(values[place]).text}" for name, values in swept.items()]
+            text = page.status_text(stored.status_at(position).reason, stored.detail(position))
+        point = [f"{name} {page.value_cell(values[place]).text}" for name, values in swept.items()]
         rows.append(f"{', '.join(point)}: {text}")
     if len(failed) > MAX_DETAILS:
         rows.append(f"and {len(failed) - MAX_DETAILS} more")
     return rows
 
 
-def jobs_table(data: xr.Dataset, limits: Limits = NO_LIMITS, units: Units = "usual") -> PageTable:
+def jobs_table(
+    data: xr.Dataset, limits: Limits = NO_LIMITS, units: Units = "usual"
+) -> page.PageTable:
     """Return a row for every job of a study, as far as a page can hold them."""
     swept, shown = swept_values(data), measures(data, units)
     metrics = [(m, m.of(data).ravel(), m.bar(data).ravel()) for m in shown]
@@ -171,12 +161,13 @@ def jobs_table(data: xr.Dataset, limits: Limits = NO_LIMITS, units: Units = "usu
     ends = zip(*(data[name].values.flat for name in words), strict=True)
     rows = []
     for place, (status, reason, regime, key) in zip(range(MAX_ROWS), ends, strict=False):
-        cells = [value_cell(values[place]) for values in swept.values()]
-        cells.append(Cell(status_text(status, reason, regime)))
+        cells = [page.value_cell(values[place]) for values in swept.values()]
+        cells.append(page.Cell(page.status_text(status, reason, regime)))
         cells += [
-            measured_cell(m, float(of[place]), float(bar[place]), limits) for m, of, bar in metrics
+            page.measured_cell(m, float(of[place]), float(bar[place]), limits)
+            for m, of, bar in metrics
         ]
-        cells.append(Cell(str(key)[:KEY_DIGITS], "code"))
-        rows.append(job_row(cells, str(status), str(regime), str(key)))
-    head = [*swept, "status", *map(column_title, shown), "job"]
-    return PageTable(head, rows)
+        cells.append(page.Cell(str(key)[:KEY_DIGITS], "code"))
+        rows.append(page.job_row(cells, str(status), str(regime), str(key)))
+    head = [*swept, "status", *map(page.column_title, shown), "job"]
+    return page.PageTable(head, rows)

@@ -118,7 +118,7 @@ def test_a_twin_that_fails_stands_nowhere(swept, study, monkeypatch):
     (stored, data), (own,) = study, read_studies(swept)
     drawn = {one.name: one.figure for one in draw_for_page(stored, own, "usual")}
     monkeypatch.setattr(side_by_side, "healthy_twin", lambda run: None)
-    monkeypatch.setattr(plots, "healthy_twin", lambda run: None)
+    monkeypatch.setattr("compressor.analysis.healthy_twin", lambda run: None)
     assert compare_healthy(stored, data) is None
     alone = {one.name: one.figure for one in draw_for_page(stored, own, "usual")}
     assert [*alone] == [*drawn]

@@ -11,9 +11,9 @@ import numpy as np
 import xarray as xr
 from numpy.lib.stride_tricks import sliding_window_view
 
-from compressor.analysis import CLEARANCES, label, last_revolution
+from compressor import analysis
+from compressor.report.figures import style
 from compressor.report.figures.drawing import ROOM, Panel, rectangle
-from compressor.report.figures.style import BLACK, BY_CLEARANCE, BY_LOAD, IDEAL, LineStyle
 
 Runs = Mapping[str, xr.Dataset]
 
@@ -22,7 +22,7 @@ LOADS = {"typical": "typical model (gas force)", "design": "design model (spring
 KILONEWTON = 1e-3
 TICK = 90.0  # degrees between ticks
 SAME_CURVE = 1e-9  # curves closer than this share of their range are one curve
-WINDOW = LineStyle(BLACK, linewidth=1.1, zorder=3)
+WINDOW = style.LineStyle(style.BLACK, linewidth=1.1, zorder=3)
 MIN_MARK = 0.05  # of a panel's height: a flatter mark would not be seen
 
 
@@ -55,21 +55,25 @@ class Curve:
     name: str
     degrees: np.ndarray
     run: xr.Dataset
-    line: LineStyle
+    line: style.LineStyle
 
 
 def fault_curves(runs: Runs, fault: str, ideal: bool) -> list[Curve]:
     """Return the curves of 0.1, 0.2 and 0.3 mm, and that of no clearance before them."""
-    curves = [Curve(f"{c:g} mm", *last_revolution(runs[label(fault, c)]), BY_CLEARANCE[c])
-              for c in CLEARANCES]  # fmt: skip
-    healthy = [Curve("no clearance", *last_revolution(runs["design"]), IDEAL)] if ideal else []
-    return healthy + curves
+    curves = []
+    if ideal:
+        curves.append(Curve("no clearance", *analysis.last_revolution(runs["design"]), style.IDEAL))
+    for c in analysis.CLEARANCES:
+        x, run = analysis.last_revolution(runs[analysis.label(fault, c)])
+        curves.append(Curve(f"{c:g} mm", x, run, style.BY_CLEARANCE[c]))
+    return curves
 
 
 def load_curves(runs: Runs) -> list[Curve]:
     """Return the curves of the typical and the design model, without clearance."""
     return [
-        Curve(name, *last_revolution(runs[load]), BY_LOAD[load]) for load, name in LOADS.items()
+        Curve(name, *analysis.last_revolution(runs[load]), style.BY_LOAD[load])
+        for load, name in LOADS.items()
     ]
 
 
@@ -89,8 +93,8 @@ def plot_rows(
     panels: Sequence[Panel] | np.ndarray, curves: Sequence[Curve], quantity: Quantity
 ) -> None:
     """Draw a panel a curve, from the top; the one of no clearance is in all of them."""
-    ideal = [curve for curve in curves if curve.line is IDEAL]
-    worn = [curve for curve in curves if curve.line is not IDEAL]
+    ideal = [curve for curve in curves if curve.line is style.IDEAL]
+    worn = [curve for curve in curves if curve.line is not style.IDEAL]
     for panel, curve in zip(panels, worn, strict=True):
         alone = replace(curve, line=replace(curve.line, dash=(), linewidth=1.0))
         plot(panel, [*ideal, alone], quantity, listed=False)

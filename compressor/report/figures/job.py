@@ -6,32 +6,18 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import (
-    ORDER,
-    SPOKEN,
-    Cycle,
-    case_of,
-    end_states,
-    frame_forces,
-    impacts,
-    joints_with_clearance,
-    last_revolution,
-    read_cycle,
-    settled_revolutions,
-    shaking,
-)
+from compressor import analysis
 from compressor.cases import Sensor
 from compressor.metrics import JOINTS
-from compressor.report.figures.curves import ANGLE_AXIS, KILONEWTON
+from compressor.report.figures import curves, style
 from compressor.report.figures.drawing import WAYS, Panel, circle, join_with_gaps, make_grid
-from compressor.report.figures.style import BLACK, BLUE, GOLD, GREY, RED, LineStyle, mark
 from compressor.report.figures.table import DrawnFigure, Number, figure, spell, spell_span
 from compressor.store import CLIPPED
 from compressor.units import Units, unit_in
 
-PATH = LineStyle(BLUE, (), 0.9, 2.3)
-ZERO = LineStyle(BLACK, linewidth=0.8)
-BY_JOINT = dict(zip(JOINTS, ((BLUE, "circle"), (RED, "diamond")), strict=True))
+PATH = style.LineStyle(style.BLUE, (), 0.9, 2.3)
+ZERO = style.LineStyle(style.BLACK, linewidth=0.8)
+BY_JOINT = dict(zip(JOINTS, ((style.BLUE, "circle"), (style.RED, "diamond")), strict=True))
 CORNERS = {0: ("top dead centre", "circle"), 90: ("90°", "triangle-up"),
            180: ("bottom dead centre", "square"), 270: ("270°", "triangle-down")}  # fmt: skip
 MICROMETRE = 1e6
@@ -56,14 +42,14 @@ def caution(run: xr.Dataset) -> str:
 
 def film(run: xr.Dataset) -> str:
     """Return the sentence that captions of contacts add for joints with oil, else nothing."""
-    return FILM if case_of(run).lubricant else ""
+    return FILM if analysis.case_of(run).lubricant else ""
 
 
-THIS = LineStyle(BLUE, (), 1.1, 2.3)
-TWIN = LineStyle(GOLD, (), 2.2, 2.1)  # broader and lighter, below
-MARK = LineStyle(RED, (4, 1.5), 1.0, 2.2)
-EVENT = LineStyle(GREY, (1, 1.65), 1.0, 2.0)
-OPEN = LineStyle(BLACK, (), 4.0)
+THIS = style.LineStyle(style.BLUE, (), 1.1, 2.3)
+TWIN = style.LineStyle(style.GOLD, (), 2.2, 2.1)  # broader and lighter, below
+MARK = style.LineStyle(style.RED, (4, 1.5), 1.0, 2.2)
+EVENT = style.LineStyle(style.GREY, (1, 1.65), 1.0, 2.0)
+OPEN = style.LineStyle(style.BLACK, (), 4.0)
 BEGINS = ("opens", "begins")  # words of events; the others end what has begun
 NAMES = {"this": "this job", "twin": "the same machine without clearance"}
 MAX_ORDERS = 200  # that are drawn
@@ -77,7 +63,7 @@ def draw_analyst(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
 
     twin: the ideal machine, with the same sensor where the run has one.
     """
-    found = read_cycle(run)
+    found = analysis.read_cycle(run)
     spans = split_events(found.events)
     lanes = 1 + len(spans) + len(found.struck)
     drawing, panels = make_grid(
@@ -89,12 +75,14 @@ def draw_analyst(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     for one, line, name in ((run, THIS, NAMES["this"]), (twin, TWIN, NAMES["twin"])):
         if one is None:
             continue
-        cycle = read_cycle(one)
+        cycle = analysis.read_cycle(one)
         vibration.plot(cycle.angle, cycle.vibration, line, name)
-        load.plot(cycle.load_angle, cycle.rod_load * KILONEWTON, line, name)
+        load.plot(cycle.load_angle, cycle.rod_load * curves.KILONEWTON, line, name)
     # a film takes the blow itself: contact that begins later is none
-    word = "dry contact" if case_of(run).lubricant else "impacts"
-    struck = {f"{word}, {SPOKEN[joint]}": (at, joint) for joint, at in found.struck.items()}
+    word = "dry contact" if analysis.case_of(run).lubricant else "impacts"
+    struck = {
+        f"{word}, {analysis.SPOKEN[joint]}": (at, joint) for joint, at in found.struck.items()
+    }
     plot_events(strip, spans, struck, found.reversals)
     for panel in (strip, vibration, load):
         for angle, _ in found.events:
@@ -103,7 +91,7 @@ def draw_analyst(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
             panel.rule(MARK, x=angle)
     load.rule(ZERO, y=0.0)
     vibration.title = "acceleration of the crosshead"
-    sensor = case_of(run).sensor
+    sensor = analysis.case_of(run).sensor
     if found.is_sensed and sensor:
         vibration.title = f"record of the sensor: {sensor.place}, along {sensor.direction}"
     load.title = "rod load at the crosshead pin, tension positive; dashed: it changes its side"
@@ -112,7 +100,7 @@ def draw_analyst(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     sentence = f"The last settled revolution: {vibration.title}, and rod load below."
     numbers = number_analyst(found, word)
     if twin is not None:
-        peak, _ = loudest(read_cycle(twin))
+        peak, _ = loudest(analysis.read_cycle(twin))
         numbers.insert(2, ("greatest without clearance", spell(peak, "m/s²")))
     clipped = float(run.get("clipped_fraction", 0.0))
     if clipped >= Sensor.REPORTED:
@@ -120,17 +108,17 @@ def draw_analyst(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)
 
 
-def number_analyst(found: Cycle, contact: str) -> list[Number]:
+def number_analyst(found: analysis.Cycle, contact: str) -> list[Number]:
     """Return the numbers of a revolution; contact: what begins, in words."""
     peak, at = loudest(found)
     rms = float(np.sqrt(np.mean(found.vibration**2)))
     events = ", ".join(f"{name} at {angle:.0f}°" for angle, name in found.events)
-    struck = [(f"{contact} at the {SPOKEN[joint]}", spell_turns(at))
+    struck = [(f"{contact} at the {analysis.SPOKEN[joint]}", spell_turns(at))
               for joint, at in found.struck.items()]  # fmt: skip
     return [
         ("greatest acceleration", f"{spell(peak, 'm/s²')} ({spell(G * peak, 'g')}) at {at:.0f}°"),
         ("rms", spell(rms, "m/s²")),
-        ("rod load", spell_span(found.rod_load * KILONEWTON, "kN")),
+        ("rod load", spell_span(found.rod_load * curves.KILONEWTON, "kN")),
         ("it changes its side at", spell_turns(found.reversals)),
         *([("events", events)] if events else []),
         *struck,
@@ -144,7 +132,7 @@ def spell_turns(angles: Sequence[float] | np.ndarray) -> str:
     return (", ".join(words) or "none") + (f" and {more} more" if more else "")
 
 
-def loudest(found: Cycle) -> tuple[float, float]:
+def loudest(found: analysis.Cycle) -> tuple[float, float]:
     """Return the greatest magnitude of a revolution's vibration (m/s2), and its angle (degrees)."""
     place = int(np.argmax(np.abs(found.vibration)))
     return float(np.abs(found.vibration[place])), float(found.angle[place])
@@ -177,14 +165,14 @@ def read_signals(run: xr.Dataset) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     Of a rigid crosshead in a guide without friction the rod load is that of gas or spring and of
     inertia together.
     """
-    degrees, revolution = last_revolution(run)
-    forces = frame_forces(revolution)
+    degrees, revolution = analysis.last_revolution(run)
+    forces = analysis.frame_forces(revolution)
     along, across = forces["shaking_force"].T
     acceleration = revolution["acceleration"].values
     return degrees, forces | {
         "acceleration": acceleration, "along": along, "across": across,
         "load": -revolution["piston_force"].values,
-        "inertia": -case_of(run).machine.reciprocating_mass_kg * acceleration,
+        "inertia": -analysis.case_of(run).machine.reciprocating_mass_kg * acceleration,
     }  # fmt: skip
 
 
@@ -194,7 +182,7 @@ def draw_signals(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     drawing, panels = make_grid(4, 2, 10.4, units=units, share_x="all")
     for panel, signal in zip(panels.flat, SIGNALS, strict=True):
         panel.title = signal.title
-        panel.label("x", ANGLE_AXIS, "°")
+        panel.label("x", curves.ANGLE_AXIS, "°")
         panel.label("y", f"{signal.axis} ({{}})", signal.unit)
         panel.rule(ZERO, y=0.0)
     numbers = []
@@ -204,7 +192,7 @@ def draw_signals(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
             continue
         degrees, series = read_signals(one)
         for panel, signal in zip(panels.flat, SIGNALS, strict=True):
-            values = series[signal.name] * (KILONEWTON if signal.unit == "kN" else 1.0)
+            values = series[signal.name] * (curves.KILONEWTON if signal.unit == "kN" else 1.0)
             panel.plot(degrees, values, line, NAMES[name])
             numbers.append((f"{signal.title}{where}", spell_span(values, signal.unit)))
         panels[0, 0].span("x", degrees[0], degrees[-1])
@@ -249,9 +237,10 @@ def plot_events(
         x, y = join_with_gaps(np.array([(at, -number) for at in span]) for span in sorted(own))
         panel.plot(x, y, OPEN, lanes[number], listed=False)
     marks = [(name, at, *BY_JOINT[joint]) for name, (at, joint) in struck.items()]
-    for name, angles, color, shape in [*marks, ("reversals", np.array(reversals), RED, "square")]:
+    marks.append(("reversals", np.array(reversals), style.RED, "square"))
+    for name, angles, color, shape in marks:
         y = np.full(angles.size, -float(len(lanes)))
-        panel.plot(angles, y, mark(color, shape, 5), name, listed=False)
+        panel.plot(angles, y, style.mark(color, shape, 5), name, listed=False)
         lanes.append(name)
     if spans:
         panel.title = f"bars: {'the cam dwells' if 'cam: dwell' in spans else 'a valve is open'}"
@@ -260,7 +249,10 @@ def plot_events(
     panel.x.showgrid = panel.y.showgrid = False
 
 
-BY_END = {"head": LineStyle(BLUE, (), 1.5, 2.3), "crank": LineStyle(RED, (3.7, 1.6), 1.5, 2.3)}
+BY_END = {
+    "head": style.LineStyle(style.BLUE, (), 1.5, 2.3),
+    "crank": style.LineStyle(style.RED, (3.7, 1.6), 1.5, 2.3),
+}
 
 
 @figure("job", "cards", "indicator cards", "gas")
@@ -268,13 +260,13 @@ def draw_cards(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
     """Return the pressure in each end over gas volume and over crank angle, a revolution."""
     drawing, panels = make_grid(1, 2, 4.6, units=units, share_y="all")
     over_volume, over_angle = panels.flat
-    measured = case_of(run).gas.is_measured
+    measured = analysis.case_of(run).gas.is_measured
     over_volume.label("x", "displaced volume (litres)" if measured else "gas volume V (litres)")
-    over_angle.label("x", ANGLE_AXIS, "°")
+    over_angle.label("x", curves.ANGLE_AXIS, "°")
     for panel in panels.flat:
         panel.label("y", "pressure ({}, absolute)", "MPa")
-    degrees, revolution = last_revolution(run)
-    for end, gas in end_states(revolution).items():
+    degrees, revolution = analysis.last_revolution(run)
+    for end, gas in analysis.end_states(revolution).items():
         over_volume.plot(gas.volume, gas.pressure, BY_END[end], f"{end} end")
         over_angle.plot(degrees, gas.pressure, BY_END[end], f"{end} end")
     over_angle.x.dtick = 90.0
@@ -282,7 +274,7 @@ def draw_cards(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
     seconds = float(revolution["time"][-1] - revolution["time"][0])
     numbers = [
         (f"indicated power, {end} end", spell(1e-3 * gas.work / seconds, "kW"))
-        for end, gas in end_states(revolution).items()
+        for end, gas in analysis.end_states(revolution).items()
     ]
     sentence = (
         "Pressure of the gas over its volume and over crank angle, in the last settled revolution, "
@@ -299,12 +291,12 @@ def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     panel.label("y", "amplitude of X ({})", "N")
     numbers = []
     both = (
-        (run, THIS, "this", f"rms of X above order {ORDER}"),
+        (run, THIS, "this", f"rms of X above order {analysis.ORDER}"),
         (twin, TWIN, "twin", "without clearance"),
     )
     for one, line, name, label in both:
         if one is not None:
-            found = shaking(one)
+            found = analysis.shaking(one)
             plot_lines(panel, found.amplitudes, line, NAMES[name])
             numbers.append((label, spell(found.above, "N")))
     panel.x.title = ORDERS_AXIS
@@ -312,7 +304,7 @@ def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     return DrawnFigure(drawing.figure(), sentence + caution(run), numbers)
 
 
-def plot_lines(panel: Panel, amplitudes: np.ndarray, line: LineStyle, name: str) -> None:
+def plot_lines(panel: Panel, amplitudes: np.ndarray, line: style.LineStyle, name: str) -> None:
     """Draw amplitudes of the orders 0, 1, ..., (k,), on a log scale from 1 on; mark `ORDER`."""
     amplitudes = amplitudes[1 : MAX_ORDERS + 1]
     orders = np.arange(1, amplitudes.size + 1)
@@ -324,24 +316,25 @@ def plot_lines(panel: Panel, amplitudes: np.ndarray, line: LineStyle, name: str)
         panel.span("y", top * 10.0**-DECADES, 3 * top)
     panel.span("x", 0, orders[-1])
     if not panel.rules:
-        panel.rule(MARK, x=ORDER)
-        panel.write(f"order {ORDER}", ORDER, 1, RED, "y", (4, -4), level="top", size=8.5)
+        panel.rule(MARK, x=analysis.ORDER)
+        order, text = analysis.ORDER, f"order {analysis.ORDER}"
+        panel.write(text, order, 1, style.RED, "y", (4, -4), level="top", size=8.5)
 
 
 @figure("job", "orbits", "orbits of the journals", "clearance")
 def draw_orbits(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
     """Return the journal's orbit in each bore with clearance over the last revolution."""
-    joints = joints_with_clearance(run)
+    joints = analysis.joints_with_clearance(run)
     drawing, panels = make_grid(1, len(joints), 5.4, units=units)
     for panel, joint in zip(panels.flat, joints, strict=True):
         plot_orbit(panel, run, joint)
-    _, revolution = last_revolution(run)
+    _, revolution = analysis.last_revolution(run)
     numbers = []
     for joint in joints:
         depth = revolution["penetration"].sel(joint=joint).values
         off = spell(100.0 * (depth < 0).mean(), "% of the time")
         numbers += [
-            (f"{SPOKEN[joint]}, off its wall", off),
+            (f"{analysis.SPOKEN[joint]}, off its wall", off),
             ("deepest, below 0 a gap", spell(MICROMETRE * depth.max(), "µm")),
         ]
     sentence = "Journal centres in their bores to scale, in the last settled revolution."
@@ -350,22 +343,22 @@ def draw_orbits(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFig
 
 def plot_orbit(panel: Panel, run: xr.Dataset, joint: str) -> None:
     """Draw one orbit, to scale, in its clearance circle; marks stand at every quarter turn."""
-    degrees, revolution = last_revolution(run)
+    degrees, revolution = analysis.last_revolution(run)
     place = (
         revolution["eccentricity"].sel(joint=joint).transpose("time", "axis").values * MICROMETRE
     )
-    clearance = joints_with_clearance(run)[joint] * MICROMETRE
+    clearance = analysis.joints_with_clearance(run)[joint] * MICROMETRE
     panel.label("x", "e<sub>x</sub> ({}), along the cylinder", "µm")
     panel.label("y", "e<sub>y</sub> ({})", "µm")
-    panel.plot(*circle(clearance), LineStyle(BLACK, linewidth=1.0, zorder=1.0))
+    panel.plot(*circle(clearance), style.LineStyle(style.BLACK, linewidth=1.0, zorder=1.0))
     panel.plot(place[:, 0], place[:, 1], PATH, "path of the journal's centre")
     for angle, (name, shape) in CORNERS.items():
         nearest = np.argmin(np.abs((degrees - angle + 180) % 360 - 180))
         x, y = place[nearest]
-        panel.plot(x, y, mark(GOLD, shape, 7, 4, edge=BLACK), name)
+        panel.plot(x, y, style.mark(style.GOLD, shape, 7, 4, edge=style.BLACK), name)
     room = 1.08 * max(clearance, np.linalg.norm(place, axis=1).max())
     panel.scale_alike()
-    panel.title = f"{SPOKEN[joint]}; circle: clearance {clearance / 1e3:.3g} mm"
+    panel.title = f"{analysis.SPOKEN[joint]}; circle: clearance {clearance / 1e3:.3g} mm"
     for way in WAYS:
         panel.span(way, -room, room)
         panel.axis(way).nticks = 5
@@ -373,7 +366,7 @@ def plot_orbit(panel: Panel, run: xr.Dataset, joint: str) -> None:
 
 def show_turn(panel: Panel, step: float = 45.0) -> None:
     """Show one turn of the crank, with ticks so many degrees apart."""
-    panel.label("x", ANGLE_AXIS, "°")
+    panel.label("x", curves.ANGLE_AXIS, "°")
     panel.span("x", 0.0, 360.0)
     panel.x.dtick = step
 
@@ -384,23 +377,25 @@ def draw_impacts(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
 
     Of oiled joints, whose film takes the blow, it is that of dry contacts that begin.
     """
-    found = impacts(run)
+    found = analysis.impacts(run)
     kind, none = "impacts", "no impact: no journal came back from flight"
-    if case_of(run).lubricant:
+    if analysis.case_of(run).lubricant:
         kind, none = "dry contacts", "no dry contact begins"
     drawing, panels = make_grid(1, 1, 3.6, units=units)
     (panel,) = panels.flat
     panel.label("y", "approach speed ({})", "m/s")
-    turns, numbers = settled_revolutions(run), []
-    for joint in joints_with_clearance(run):
+    turns, numbers = analysis.settled_revolutions(run), []
+    for joint in analysis.joints_with_clearance(run):
         color, shape = BY_JOINT[joint]
         mine = [one for one in found if one.joint == joint]
         angle = np.array([one.crank_angle for one in mine])
         speed = np.array([one.approach_speed for one in mine])
-        name = f"{SPOKEN[joint]}: {angle.size / turns:.3g} {kind} a revolution"
-        panel.strokes(angle, 0.0, speed, LineStyle(color, linewidth=0.8))
-        panel.plot(angle, speed, mark(color, shape, 5), name)
-        numbers.append((f"{kind} a revolution at the {SPOKEN[joint]}", spell(angle.size / turns)))
+        name = f"{analysis.SPOKEN[joint]}: {angle.size / turns:.3g} {kind} a revolution"
+        panel.strokes(angle, 0.0, speed, style.LineStyle(color, linewidth=0.8))
+        panel.plot(angle, speed, style.mark(color, shape, 5), name)
+        numbers.append(
+            (f"{kind} a revolution at the {analysis.SPOKEN[joint]}", spell(angle.size / turns))
+        )
         if angle.size:
             fastest = int(np.argmax(speed))
             text = f"{spell(speed[fastest], 'm/s')} at {angle[fastest]:.0f}°"

@@ -8,50 +8,15 @@ import plotly.graph_objects as go
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from compressor.analysis import (
-    CLEARANCES,
-    SPOKEN,
-    Cam,
-    case_of,
-    end_states,
-    faulty_joints,
-    force_relation,
-    ideal_motion,
-    label,
-    record_of,
-    settled_part,
-)
-from compressor.report.figures.curves import (
-    ANGLE_AXIS,
-    KILONEWTON,
-    SAME_CURVE,
-    Curve,
-    Quantity,
-    Runs,
-    differing_part,
-    fault_curves,
-    load_curves,
-    plot,
-    plot_enlarged,
-    plot_rows,
-)
+from compressor import analysis
+from compressor.report.figures import curves, style
 from compressor.report.figures.drawing import WAYS, Drawing, Panel, circle, make_grid
-from compressor.report.figures.style import (
-    BLACK,
-    BLUE,
-    BY_CLEARANCE,
-    GOLD,
-    RED,
-    LineStyle,
-    fill,
-    mark,
-)
 from compressor.report.figures.table import DrawnFigure, figure, spell
 from compressor.units import Units
 
 SERIES = ("displacement", "velocity", "acceleration")
 WORDS = "displacement, velocity and acceleration"
-AT = f"{', '.join(f'{c:g}' for c in CLEARANCES)} mm"
+AT = f"{', '.join(f'{c:g}' for c in analysis.CLEARANCES)} mm"
 
 
 def paper_figure(
@@ -63,7 +28,7 @@ def paper_figure(
 
 def sizes(fault: str, *more: str) -> tuple[str, ...]:
     """Return the labels of more runs, and of a fault's three clearances."""
-    return (*more, *(label(fault, clearance) for clearance in CLEARANCES))
+    return (*more, *(analysis.label(fault, clearance) for clearance in analysis.CLEARANCES))
 
 
 def spell_angles(found: ArrayLike) -> str:
@@ -72,20 +37,22 @@ def spell_angles(found: ArrayLike) -> str:
 
 
 MOTION = (
-    Quantity("displacement", "displacement", "displacement", "mm", 1e3, window=24.0, steep=True),
-    Quantity("velocity", "velocity", "velocity", "m/s", steep=True),
-    Quantity("acceleration", "acceleration", "acceleration", "m/s²"),
+    curves.Quantity(
+        "displacement", "displacement", "displacement", "mm", 1e3, window=24.0, steep=True
+    ),
+    curves.Quantity("velocity", "velocity", "velocity", "m/s", steep=True),
+    curves.Quantity("acceleration", "acceleration", "acceleration", "m/s²"),
 )
 
 
 @paper_figure(6, "Response of the design and the typical model", "design", "typical")
-def draw_load_response(runs: Runs, units: Units = "usual") -> DrawnFigure:
+def draw_load_response(runs: curves.Runs, units: Units = "usual") -> DrawnFigure:
     """Return figure 6: the design and the typical model without clearance."""
-    curves = load_curves(runs)
+    drawn = curves.load_curves(runs)
     drawing, panels = make_grid(3, 2, 9.6, units=units)
     for (full, enlarged), quantity, letters in zip(panels, MOTION, ("ab", "cd", "ef"), strict=True):
-        plot(full, curves, quantity)
-        enlarge([full], enlarged, curves, quantity, letters)
+        curves.plot(full, drawn, quantity)
+        enlarge([full], enlarged, drawn, quantity, letters)
     one, other = runs["design"], runs["typical"]
     away = [
         np.abs(one[name].values - other[name].values).max() / np.ptp(other[name].values)
@@ -95,7 +62,7 @@ def draw_load_response(runs: Runs, units: Units = "usual") -> DrawnFigure:
         "Both models without clearance: left, the last revolution; right, the part in the black "
         "rectangle, at a peak."
     )
-    shares = spell(np.where(np.array(away) <= SAME_CURVE, 0.0, 100.0 * np.array(away)))
+    shares = spell(np.where(np.array(away) <= curves.SAME_CURVE, 0.0, 100.0 * np.array(away)))
     numbers = [(f"greatest difference of {WORDS}", f"{shares} % of the range")]
     return DrawnFigure(finish_figure(drawing, panels[-1]), sentence, numbers)
 
@@ -105,54 +72,54 @@ def draw_load_response(runs: Runs, units: Units = "usual") -> DrawnFigure:
 @paper_figure(11, "Response with clearance at the small end", *sizes("small_end", "design"),
               fault="small_end")  # fmt: skip
 @paper_figure(14, "Response with clearance at both joints", *sizes("both", "design"), fault="both")
-def draw_fault_response(runs: Runs, fault: str, units: Units = "usual") -> DrawnFigure:
+def draw_fault_response(runs: curves.Runs, fault: str, units: Units = "usual") -> DrawnFigure:
     """Return figure 8, 11 or 14: no clearance, and three clearances of one fault."""
-    curves = fault_curves(runs, fault, ideal=True)
+    drawn = curves.fault_curves(runs, fault, ideal=True)
     drawing, panels = make_grid(
         5, 2, 11.5, heights=(3, 3, 2, 2, 2), units=units, tall=[slice(2, 5)]
     )
     for (full, enlarged), quantity, letters in zip(panels, MOTION[:2], ("ab", "cd"), strict=False):
-        plot(full, curves, quantity)
-        enlarge([full], enlarged, curves, quantity, letters)
+        curves.plot(full, drawn, quantity)
+        enlarge([full], enlarged, drawn, quantity, letters)
     enlarged = panels[2, 1]
-    plot_rows(panels[2:, 0], curves, MOTION[2])
-    enlarge(panels[2:, 0], enlarged, curves, MOTION[2], "ef")
+    curves.plot_rows(panels[2:, 0], drawn, MOTION[2])
+    enlarge(panels[2:, 0], enlarged, drawn, MOTION[2], "ef")
     sentence = (
         "Left, the last revolution, acceleration in a row a clearance, with the motion without "
         "clearance dotted; right, the part in the black rectangles, where the curves differ most."
     )
-    worn = [runs[label(fault, c)] for c in CLEARANCES]
+    worn = [runs[analysis.label(fault, c)] for c in analysis.CLEARANCES]
     away = 100.0 * np.max([differences_from_ideal(run) for run in worn], axis=0)
     peaks = spell([run["peak_acceleration"] for run in worn], "m/s²")
     numbers = [
         (f"greatest difference of {WORDS} from no clearance", f"{spell(away)} % of the range"),
         (f"greatest acceleration at {AT}", peaks),
     ]
-    for joint in faulty_joints(fault):
+    for joint in analysis.faulty_joints(fault):
         lost = [100.0 * run["contact_loss_fraction"].sel(joint=joint) for run in worn]
-        numbers.append((f"time without contact at the {SPOKEN[joint]}", spell(lost, "%")))
+        numbers.append((f"time without contact at the {analysis.SPOKEN[joint]}", spell(lost, "%")))
     return DrawnFigure(finish_figure(drawing, [panels[-1, 0], enlarged]), sentence, numbers)
 
 
 def differences_from_ideal(run: xr.Dataset) -> list[float]:
     """Return how far `SERIES` of a run leave those of ideal joints, as shares of their ranges."""
-    settled = settled_part(run)
+    settled = analysis.settled_part(run)
     return [
         float(np.abs(settled[name].values - ideal).max() / np.ptp(ideal))
-        for name, ideal in zip(SERIES, ideal_motion(settled), strict=True)
+        for name, ideal in zip(SERIES, analysis.ideal_motion(settled), strict=True)
     ]
 
 
 def enlarge(
     full: Sequence[Panel] | np.ndarray,
     enlarged: Panel,
-    curves: Sequence[Curve],
-    quantity: Quantity,
+    drawn: Sequence[curves.Curve],
+    quantity: curves.Quantity,
     letters: str,
 ) -> None:
     """Draw the view where the curves differ most, and the titles of both."""
-    part, differs = differing_part(curves, quantity)
-    plot_enlarged(full, enlarged, curves, quantity, part)
+    part, differs = curves.differing_part(drawn, quantity)
+    curves.plot_enlarged(full, enlarged, drawn, quantity, part)
     full[0].title = f"({letters[0]}) {full[0].title}"
     remark = "" if differs else ": the curves coincide"
     enlarged.title = f"({letters[1]}) {quantity.title}, enlarged{remark}"
@@ -161,20 +128,20 @@ def enlarge(
 def finish_figure(drawing: Drawing, lowest: Sequence[Panel] | np.ndarray) -> go.Figure:
     """Return the figure with titles of its lowest axes."""
     for panel in lowest:
-        panel.x.title = ANGLE_AXIS
+        panel.x.title = curves.ANGLE_AXIS
     return drawing.figure()
 
 
-PISTON = Quantity(
-    "piston_force", "force on the piston, towards the crank", "force", "kN", KILONEWTON
+PISTON = curves.Quantity(
+    "piston_force", "force on the piston, towards the crank", "force", "kN", curves.KILONEWTON
 )
 
 
 @paper_figure(7, "Piston force of the design and the typical model", "design", "typical")
-def draw_piston_force(runs: Runs, units: Units = "usual") -> DrawnFigure:
+def draw_piston_force(runs: curves.Runs, units: Units = "usual") -> DrawnFigure:
     """Return figure 7: the piston force of the design and the typical model."""
     drawing, panels = make_grid(1, 1, 4.2, units=units)
-    plot(panels[0, 0], load_curves(runs), PISTON)
+    curves.plot(panels[0, 0], curves.load_curves(runs), PISTON)
     panels[0, 0].span("y", low=0)
     sentence = (
         "The force on the piston over the last revolution. Steps of the spring's force are its "
@@ -182,9 +149,11 @@ def draw_piston_force(runs: Runs, units: Units = "usual") -> DrawnFigure:
     )
     numbers = []
     for load, name in (("design", "spring"), ("typical", "gas")):
-        peak = float(runs[load]["piston_force"].max()) * KILONEWTON
+        peak = float(runs[load]["piston_force"].max()) * curves.KILONEWTON
         numbers.append((f"greatest force of the {name}", spell(peak, "kN")))
-        numbers.append((f"corners of the {name}", spell_angles(record_of(runs[load]).corners)))
+        numbers.append(
+            (f"corners of the {name}", spell_angles(analysis.record_of(runs[load]).corners))
+        )
     return DrawnFigure(finish_figure(drawing, panels[0]), sentence, numbers)
 
 
@@ -196,7 +165,9 @@ def draw_piston_force(runs: Runs, units: Units = "usual") -> DrawnFigure:
               fault="both", joint="big_end")  # fmt: skip
 @paper_figure(16, "Contact force at the small end, clearance at both joints", *sizes("both"),
               fault="both", joint="small_end")  # fmt: skip
-def draw_contact_force(runs: Runs, fault: str, joint: str, units: Units = "usual") -> DrawnFigure:
+def draw_contact_force(
+    runs: curves.Runs, fault: str, joint: str, units: Units = "usual"
+) -> DrawnFigure:
     """Return figure 9, 12, 15 or 16: contact force at one joint both ways, a row a clearance.
 
     All enlarged views show one window, chosen at the fault's first joint.
@@ -205,14 +176,14 @@ def draw_contact_force(runs: Runs, fault: str, joint: str, units: Units = "usual
     drawing, panels = make_grid(
         6, 2, 11.5, widths=(2, 1), units=units, share_x="columns", tall=both
     )
-    curves = fault_curves(runs, fault, ideal=False)
-    chosen_by = faulty_joints(fault)[0]
-    part, _ = differing_part(curves, contact_force(chosen_by, "x"))
+    drawn = curves.fault_curves(runs, fault, ideal=False)
+    chosen_by = analysis.faulty_joints(fault)[0]
+    part, _ = curves.differing_part(drawn, contact_force(chosen_by, "x"))
     for rows, axis, letter in zip(both, "xy", "ab", strict=True):
         quantity = contact_force(joint, axis)
         enlarged = panels[rows.start, 1]
-        plot_rows(panels[rows, 0], curves, quantity)
-        plot_enlarged(panels[rows, 0], enlarged, curves, quantity, part)
+        curves.plot_rows(panels[rows, 0], drawn, quantity)
+        curves.plot_enlarged(panels[rows, 0], enlarged, drawn, quantity, part)
         top = panels[rows, 0][0]
         top.title = f"({letter}) {top.title}"
         enlarged.title = "enlarged"
@@ -220,40 +191,43 @@ def draw_contact_force(runs: Runs, fault: str, joint: str, units: Units = "usual
     sentence = (
         "Force on the rod: (a) along the cylinder, positive away from the crank, and (b) vertical, "
         "on a scale of its own. Left, the last revolution, a row a clearance; right, the part in "
-        f"the black rectangles, where the horizontal forces at the {SPOKEN[chosen_by]} differ most."
+        f"the black rectangles, where the horizontal forces at the {analysis.SPOKEN[chosen_by]} "
+        "differ most."
     )
     numbers = []
     for axis, words in (("x", "along the cylinder"), ("y", "across it")):
-        peaks = [runs[label(fault, c)]["peak_contact_force_axis"].sel(joint=joint, axis=axis)
-                 for c in CLEARANCES]  # fmt: skip
-        values = spell(np.array(peaks) * KILONEWTON, "kN")
+        worn = [runs[analysis.label(fault, c)] for c in analysis.CLEARANCES]
+        peaks = [run["peak_contact_force_axis"].sel(joint=joint, axis=axis) for run in worn]
+        values = spell(np.array(peaks) * curves.KILONEWTON, "kN")
         numbers.append((f"greatest {words} at {AT}", values))
     return DrawnFigure(finish_figure(drawing, [panels[-1, 0], enlarged]), sentence, numbers)
 
 
-def contact_force(joint: str, axis: str) -> Quantity:
+def contact_force(joint: str, axis: str) -> curves.Quantity:
     """Return the force on the rod at a joint along an axis, kN."""
     title = {"x": "horizontal force on the rod", "y": "vertical force on the rod"}[axis]
     where = (("joint", joint), ("axis", axis))
-    return Quantity("contact_force", title, "force", "kN", KILONEWTON, where=where)
+    return curves.Quantity("contact_force", title, "force", "kN", curves.KILONEWTON, where=where)
 
 
 @paper_figure(10, "Acceleration against horizontal contact force, big end", *sizes("big_end"),
               joint="big_end")  # fmt: skip
 @paper_figure(13, "Acceleration against horizontal contact force, small end", *sizes("small_end"),
               joint="small_end")  # fmt: skip
-def draw_relation(runs: Runs, joint: str, units: Units = "usual") -> DrawnFigure:
+def draw_relation(runs: curves.Runs, joint: str, units: Units = "usual") -> DrawnFigure:
     """Return one panel a clearance: every stored sample, the regression line, r and r²."""
     drawing, panels = make_grid(1, 3, 4.0, units=units, share_x="all", share_y="all")
-    for panel, letter, clearance in zip(panels.flat, "abc", CLEARANCES, strict=True):
-        run = runs[label(joint, clearance)]
+    for panel, letter, clearance in zip(panels.flat, "abc", analysis.CLEARANCES, strict=True):
+        run = runs[analysis.label(joint, clearance)]
         name = f"{clearance:g} mm"
         panel.label("x", "horizontal force on the rod ({})", "kN")
         panel.label("y", "acceleration ({})", "m/s²")
-        scatter(panel, settled_part(run), joint, BY_CLEARANCE[clearance].color, name)
+        scatter(panel, analysis.settled_part(run), joint, style.BY_CLEARANCE[clearance].color, name)
         regress(panel, run, joint)
         panel.title = f"({letter}) {name}"
-    found = [force_relation(runs[label(joint, c)], joint) for c in CLEARANCES]
+    found = [
+        analysis.force_relation(runs[analysis.label(joint, c)], joint) for c in analysis.CLEARANCES
+    ]
     sentence = (
         "A dot for each stored sample; the line is the least-squares fit of force on acceleration, "
         "whose slope is a mass."
@@ -268,37 +242,37 @@ def draw_relation(runs: Runs, joint: str, units: Units = "usual") -> DrawnFigure
 def scatter(panel: Panel, run: xr.Dataset, joint: str, color: str, name: str) -> None:
     """Draw a dot for every stored sample."""
     force = contact_force(joint, "x").values(run)
-    dots = mark(color, "circle", 2.2, edge_width=0.0, alpha=0.45)
+    dots = style.mark(color, "circle", 2.2, edge_width=0.0, alpha=0.45)
     panel.plot(force, run["acceleration"].values, dots, name, listed=False)
 
 
 def regress(panel: Panel, run: xr.Dataset, joint: str) -> None:
     """Draw the line of `force_relation` over the data's accelerations, and its numbers."""
-    relation = force_relation(run, joint)
-    a = settled_part(run)["acceleration"].values
+    relation = analysis.force_relation(run, joint)
+    a = analysis.settled_part(run)["acceleration"].values
     ends = np.array([a.min(), a.max()])
-    force = (relation.slope * ends + relation.intercept) * KILONEWTON
-    panel.plot(force, ends, LineStyle(BLACK, linewidth=1.1), "fit", listed=False)
+    force = (relation.slope * ends + relation.intercept) * curves.KILONEWTON
+    panel.plot(force, ends, style.LineStyle(style.BLACK, linewidth=1.1), "fit", listed=False)
     r = math.copysign(math.sqrt(relation.r2), relation.slope)
-    sign = "−" if relation.intercept < 0 else "+"
+    sign, size = "−" if relation.intercept < 0 else "+", abs(relation.intercept) * curves.KILONEWTON
     numbers = (
         f"r = {r:.3f},  r² = {relation.r2:.3f}\n"
-        f"F = {relation.slope:.1f} kg · a {sign} {abs(relation.intercept) * KILONEWTON:.2f} kN"
+        f"F = {relation.slope:.1f} kg · a {sign} {size:.2f} kN"
     ).replace("-", "−")
     at, side = (0.03, "left") if relation.slope > 0 else (0.97, "right")
     panel.write(numbers, at, 0.98, inside="xy", side=side, level="top", size=8.5)
 
 
-CLOSED = LineStyle(BLUE, (), 1.8, 2.3)
-PRINTED = LineStyle(GOLD, (), 1.6, 2.2)
-BASE = LineStyle("#707070", (1, 1.2), 1.2, 2.1)
+CLOSED = style.LineStyle(style.BLUE, (), 1.8, 2.3)
+PRINTED = style.LineStyle(style.GOLD, (), 1.6, 2.2)
+BASE = style.LineStyle("#707070", (1, 1.2), 1.2, 2.1)
 
 
 @paper_figure(3, "The ideal p–V diagram", "typical")
-def draw_pressure_volume(runs: Runs, units: Units = "usual") -> DrawnFigure:
+def draw_pressure_volume(runs: curves.Runs, units: Units = "usual") -> DrawnFigure:
     """Return figure 3: cylinder pressure over volume."""
-    run, gas = settled_part(runs["typical"]), case_of(runs["typical"]).gas
-    states = end_states(run)
+    run, gas = analysis.settled_part(runs["typical"]), analysis.case_of(runs["typical"]).gas
+    states = analysis.end_states(run)
     end = (gas.compressing_ends or [*states])[0]
     volume, pressure = states[end]
     drawing, panels = make_grid(1, 1, 5.2, units=units)
@@ -312,9 +286,9 @@ def draw_pressure_volume(runs: Runs, units: Units = "usual") -> DrawnFigure:
         f"Pressure over gas volume in the {end} end of the typical model's cylinder; against "
         "the clock, from the upper left: expansion, suction, compression, discharge."
     )
-    numbers, used = [], record_of(run).corners
+    numbers, used = [], analysis.record_of(run).corners
     if used.any():
-        off = np.abs(used - Cam.of(run).gas_corners).max()
+        off = np.abs(used - analysis.Cam.of(run).gas_corners).max()
         numbers = [
             ("the phases change at", spell_angles(used)),
             ("off the ideal gas's corners by up to", spell_angles(off)),
@@ -323,9 +297,9 @@ def draw_pressure_volume(runs: Runs, units: Units = "usual") -> DrawnFigure:
 
 
 @paper_figure(4, "The cam of the spring load", "design")
-def draw_cam(runs: Runs, units: Units = "usual") -> DrawnFigure:
+def draw_cam(runs: curves.Runs, units: Units = "usual") -> DrawnFigure:
     """Return figure 4: the cam's contour, and its follower's displacement, also as printed."""
-    cam = Cam.of(runs["design"])
+    cam = analysis.Cam.of(runs["design"])
     angles = np.radians(np.linspace(0, 360, 1441))
     drawing, panels = make_grid(1, 2, 4.9, widths=(1, 1.25), units=units)
     draw_contour(panels[0, 0], cam, angles)
@@ -344,14 +318,14 @@ def draw_cam(runs: Runs, units: Units = "usual") -> DrawnFigure:
     return DrawnFigure(drawing.figure(), sentence, numbers)
 
 
-def draw_contour(panel: Panel, cam: Cam, angles: np.ndarray) -> None:
+def draw_contour(panel: Panel, cam: analysis.Cam, angles: np.ndarray) -> None:
     """Draw the closed cam's pitch curve around its base circle."""
     x, y = cam.contour(angles, cam.base_radius)
     panel.title = "(a) contour of the closed cam"
     panel.scale_alike()
     panel.label("x", "x ({})", "mm")
     panel.label("y", "y ({})", "mm")
-    panel.fill(*circle(cam.base_radius * 1e3), fill("#f1f1f1"))
+    panel.fill(*circle(cam.base_radius * 1e3), style.fill("#f1f1f1"))
     rim = cam.base_radius * 1e3 * np.array([np.cos(angles), np.sin(angles)])
     panel.plot(rim[0], rim[1], BASE, f"base circle, {cam.base_radius * 1e3:g} mm")
     panel.plot(x * 1e3, y * 1e3, CLOSED, "roller's path")
@@ -360,7 +334,7 @@ def draw_contour(panel: Panel, cam: Cam, angles: np.ndarray) -> None:
         panel.span(way, 1e3 * (values.min() - room), 1e3 * (values.max() + room))
 
 
-def draw_follower(panel: Panel, cam: Cam, angles: np.ndarray) -> None:
+def draw_follower(panel: Panel, cam: analysis.Cam, angles: np.ndarray) -> None:
     """Draw the follower displacement of the closed cam, and of Eq. 10 taken literally."""
     panel.label("x", "cam angle (°)")
     panel.label("y", "s ({})", "mm")
@@ -373,7 +347,7 @@ def draw_follower(panel: Panel, cam: Cam, angles: np.ndarray) -> None:
     panel.plot(np.degrees(angles), s, CLOSED, "closed cam, as simulated")
     height, left = (float(cam.printed_follower(turn)) * 1e3 for turn in (math.pi, fall))
     where = math.degrees(fall)
-    dots = LineStyle(RED, (1, 1.65), 1.5)
+    dots = style.LineStyle(style.RED, (1, 1.65), 1.5)
     panel.strokes(np.array([where]), left, np.array([height]), dots)
     panel.write(f"printed: rises by {height:.1f} mm", 150, height, shift=(0, 5), size=9)
     text = f"and falls by {left:.1f} mm:\nit does not close"

@@ -7,10 +7,10 @@ import numpy as np
 import plotly.graph_objects as go
 import xarray as xr
 
-from compressor.analysis import ORDER, Cycle, Spectrum
+from compressor import analysis
+from compressor.report.figures import style
 from compressor.report.figures.drawing import Drawing, Panel, make_grid
 from compressor.report.figures.job import ORDERS_AXIS, G, loudest, show_turn
-from compressor.report.figures.style import BLACK, BLUE, GOLD, RED, LineStyle, mark, palette
 from compressor.report.figures.table import DrawnFigure, Number, figure, spell
 from compressor.units import Units
 
@@ -54,8 +54,8 @@ class SweptRow:
     """
 
     value: str
-    shaking: Spectrum | None = None
-    cycle: Cycle | None = None
+    shaking: analysis.Spectrum | None = None
+    cycle: analysis.Cycle | None = None
     segments: Segments | None = None
     problem: str = ""
     chaotic: bool = False
@@ -97,7 +97,9 @@ def start_map(
         1, 2, height(len(rows)) + 0.9, widths=(3, 1), units=units, share_y="all"
     )
     image, shown = panels[0, 0], np.clip(table, *ends)  # nan stays
-    image.map(x, np.arange(len(rows)), shown, palette("cividis"), ends, name, unit, is_log=True)
+    image.map(
+        x, np.arange(len(rows)), shown, style.palette("cividis"), ends, name, unit, is_log=True
+    )
     label_rows(image, rows, title)
     return drawing, image
 
@@ -107,7 +109,7 @@ def finish_map(
 ) -> go.Figure:
     """Return a figure of `start_map` with a number a row beside the map; top: of its axis."""
     _, beside = drawing.panels
-    dots = LineStyle(BLUE, linewidth=1.5, marker="circle", markersize=3.5)
+    dots = style.LineStyle(style.BLUE, linewidth=1.5, marker="circle", markersize=3.5)
     beside.label("x", title, unit)
     beside.plot(values, np.arange(values.size, dtype=float), dots)
     beside.span("x", 0, top)
@@ -133,13 +135,13 @@ def draw_cycles(rows: Sequence[SweptRow], title: str, units: Units = "usual") ->
     corner = "corner of the load" if has_cam else "a valve opens or closes"
     for name, shape, color, angles in (
         (corner, "triangle-down", "#ffffff", corners),
-        ("rod load changes its side", "square", RED, reversals),
+        ("rod load changes its side", "square", style.RED, reversals),
     ):
         if not any(len(some) for some in angles):
             continue
         x = np.array([at for some in angles for at in some])
         y = np.array([float(n) for n, some in enumerate(angles) for _ in some])
-        image.plot(x, y, mark(color, shape, 4, edge=BLACK), name)
+        image.plot(x, y, style.mark(color, shape, 4, edge=style.BLACK), name)
     show_turn(image, 90.0)
     peaks = np.nanmax(np.where(np.isnan(table), -1.0, table), axis=1)
     peaks = np.where(peaks < 0, np.nan, peaks)
@@ -174,15 +176,17 @@ def draw_segments(rows: Sequence[SweptRow], title: str, units: Units = "usual") 
     top = max(float(np.nanmax(table)), 1.1)
     drawing, image = start_map(rows, title, 10.0 * np.arange(36) + 5.0, table, (1.0, top),
                                "rms over that without clearance", "", units)  # fmt: skip
+    over_limit = [one.over_limit if one else None for one in found]
+    doubtful = [one.doubtful if one else None for one in found]
     for name, shape, color, over in (
-        ("over its limit", "square", RED, [o.over_limit if o else None for o in found]),
-        ("perhaps over it, by the bar", "circle", GOLD, [o.doubtful if o else None for o in found]),
+        ("over its limit", "square", style.RED, over_limit),
+        ("perhaps over it, by the bar", "circle", style.GOLD, doubtful),
     ):
         marks = [(10.0 * at + 5.0, float(n)) for n, some in enumerate(over) if some is not None
                  for at in np.flatnonzero(some)]  # fmt: skip
         if marks:
             x, y = np.array(marks).T
-            image.plot(x, y, mark(color, shape, 4, edge=BLACK), name)
+            image.plot(x, y, style.mark(color, shape, 4, edge=style.BLACK), name)
     show_turn(image, 90.0)
     greatest = np.array([np.nanmax(one.rms) if one else np.nan for one in found])
     words = "greatest rms of a<br>segment ({})"
@@ -237,18 +241,18 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str, units: Units = "usual")
     for number, one in enumerate(found):
         if one:
             table[number] = one.amplitudes[1 : size + 1]
-    top = np.nanmax(table[:, ORDER:])  # the first orders are beyond the scale
+    top = np.nanmax(table[:, analysis.ORDER :])  # the first orders are beyond the scale
     if top < 1e-9 * np.nanmax(table):  # ideal joints: rounding
         top = np.nanmax(table)
     ends = top * 10.0**-MAP_DECADES, top
     drawing, image = start_map(rows, title, np.arange(1, size + 1), table, ends,
                                "amplitude of X ({})", "N", units)  # fmt: skip
-    image.rule(LineStyle(RED, (4, 1.5)), x=ORDER + 0.5)
-    image.x.title = ORDERS_AXIS + f"; dashed: order {ORDER}"
+    image.rule(style.LineStyle(style.RED, (4, 1.5)), x=analysis.ORDER + 0.5)
+    image.x.title = ORDERS_AXIS + f"; dashed: order {analysis.ORDER}"
     above = np.array([one.above if one else np.nan for one in found])
-    words = f"rms of X above<br>order {ORDER} ({{}})"
+    words = f"rms of X above<br>order {analysis.ORDER} ({{}})"
     figure = finish_map(drawing, above, words, "N", max(1.0, 1.08 * np.nanmax(above)))
-    numbers = spell_ends(f"rms of X above order {ORDER}", above, rows, "N")
+    numbers = spell_ends(f"rms of X above order {analysis.ORDER}", above, rows, "N")
     sentence = f"Order spectra of X, {describe_rows(rows, title)}.{left_out(rows)}"
     return DrawnFigure(figure, sentence, numbers)
 

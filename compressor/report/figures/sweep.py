@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import xarray as xr
 
+from compressor.report.figures import sweep_maps, sweep_panels
 from compressor.report.figures.sweep_data import (
     Measure,
     PlottedAxis,
@@ -12,27 +13,6 @@ from compressor.report.figures.sweep_data import (
     measures,
     shown_value,
     sweep_of,
-)
-from compressor.report.figures.sweep_maps import (
-    MAX_CELLS,
-    Ranking,
-    draw_maps,
-    draw_ranking,
-    order_by_mean_strength,
-    order_of,
-    ranking,
-    spell_strongest,
-)
-from compressor.report.figures.sweep_panels import (
-    MAX_JOBS,
-    MAX_LINES,
-    MAX_PLACES,
-    MAX_POINTS,
-    draw_curves,
-    draw_overview,
-    draw_points,
-    grouping,
-    roles_of,
 )
 from compressor.report.figures.table import DrawnFigure, Number
 from compressor.report.limits import NO_LIMITS, Limits
@@ -80,7 +60,8 @@ def draw_sweep(
             "enough to be seen."
         )
         return [DrawnFigure(
-            draw_curves(sweep, shown, limits), sentence, [*count_drawn(axis, MAX_JOBS), *about],
+            sweep_panels.draw_curves(sweep, shown, limits), sentence,
+            [*count_drawn(axis, sweep_panels.MAX_JOBS), *about],
             zone_words(shown, limits), axis.name, f"metrics against {axis.phrase}",
         )]  # fmt: skip
     return [*draw_grid(sweep, shown, about, limits)]
@@ -95,17 +76,18 @@ def draw_grid(
     sweep: PlottedSweep, shown: Sequence[Measure], about: Sequence[Number], limits: Limits
 ) -> Iterator[DrawnFigure]:
     """Yield a grid's figures: a ranking, and all metrics as maps or lines."""
-    found = ranking(sweep, shown)
+    found = sweep_maps.ranking(sweep, shown)
     yield from draw_ranked(sweep, found, shown)
-    order = order_by_mean_strength(found) if found else [*range(len(sweep.axes))]
+    order = sweep_maps.order_by_mean_strength(found) if found else [*range(len(sweep.axes))]
     first, second = (sweep.axes[n] for n in order[:2])
     if len(sweep.axes) == 2 and first.is_words == second.is_words:
         title = f"metrics over {first.phrase} and {second.phrase}"
-        cut = [number for axis in sweep.axes for number in count_drawn(axis, MAX_CELLS)]
-        yield DrawnFigure(draw_maps(sweep, shown, limits), "A cell a job.", [*cut, *about],
-                          zone_words(shown, limits), "map", title)  # fmt: skip
+        cut = [number for axis in sweep.axes for number in count_drawn(axis, sweep_maps.MAX_CELLS)]
+        maps = sweep_maps.draw_maps(sweep, shown, limits)
+        yield DrawnFigure(maps, "A cell a job.", [*cut, *about], zone_words(shown, limits), "map",
+                          title)  # fmt: skip
         return
-    role = roles_of(sweep, order)
+    role = sweep_panels.roles_of(sweep, order)
     x, color = (sweep.axes[n] for n in role)
     others = [axis.phrase for n, axis in enumerate(sweep.axes) if n not in role]
     point = f"the mean over {' and '.join(others)}" if others else "a job"
@@ -113,9 +95,9 @@ def draw_grid(
         f"Every metric over {x.phrase}, a colour for each value of {color.phrase}; a point is "
         f"{point}."
     )
-    cut = [*count_drawn(x, MAX_PLACES), *count_drawn(color, MAX_LINES)]
+    cut = [*count_drawn(x, sweep_panels.MAX_PLACES), *count_drawn(color, sweep_panels.MAX_LINES)]
     yield DrawnFigure(
-        draw_overview(sweep, role, shown), sentence, [*cut, *about],
+        sweep_panels.draw_overview(sweep, role, shown), sentence, [*cut, *about],
         " What is not known within its error bar is no part of a mean." * bool(others),
         "overview", f"metrics over {x.phrase} and {color.phrase}",
     )  # fmt: skip
@@ -125,30 +107,32 @@ def draw_sampled(
     sweep: PlottedSweep, shown: Sequence[Measure], about: Sequence[Number]
 ) -> Iterator[DrawnFigure]:
     """Yield a list's figures: a ranking, and each metric over its strongest key."""
-    found = ranking(sweep, shown)
+    found = sweep_maps.ranking(sweep, shown)
     yield from draw_ranked(sweep, found, shown)
-    order = order_by_mean_strength(found) if found else [*range(len(sweep.axes))]
+    order = sweep_maps.order_by_mean_strength(found) if found else [*range(len(sweep.axes))]
     numbers = [n for n in order if not sweep.axes[n].is_words] or order
     strongest = []
     for measure in shown:
-        own = order_of(found[measure]) if measure in found else order
+        own = sweep_maps.order_of(found[measure]) if measure in found else order
         strongest.append(next(n for n in own if n in numbers))
     # where some keys are words, each metric is drawn over a number
     kind = "number" if {axis.is_words for axis in sweep.axes} == {True, False} else "key"
     which = f"the {kind} that matters most for each" if found else f"a {kind}"
-    phrase, _, _ = grouping(sweep)
+    phrase, _, _ = sweep_panels.grouping(sweep)
     colors = f", a colour for each {phrase}" * bool(phrase)
     count = sweep.status.size
-    drawn = [("jobs drawn", f"{MAX_POINTS:,} of {count:,}")] * (count > MAX_POINTS)
+    drawn = [("jobs drawn", f"{sweep_panels.MAX_POINTS:,} of {count:,}")] * (
+        count > sweep_panels.MAX_POINTS
+    )
     yield DrawnFigure(
-        draw_points(sweep, strongest, shown),
+        sweep_panels.draw_points(sweep, strongest, shown),
         f"Every metric over {which}, a point a job{colors}.", [*drawn, *about], "", "points",
         f"metrics over {which}",
     )  # fmt: skip
 
 
 def draw_ranked(
-    sweep: PlottedSweep, found: Ranking, shown: Sequence[Measure]
+    sweep: PlottedSweep, found: sweep_maps.Ranking, shown: Sequence[Measure]
 ) -> Iterator[DrawnFigure]:
     """Yield the ranking of the axes, if enough is known for one."""
     if not found or len(sweep.axes) < 2:
@@ -158,7 +142,9 @@ def draw_ranked(
     bases = {effects.base for effects in found.values() if effects.base}
     left = [measure.title for measure in shown if measure not in found]
     how = "count with the sum of their axes' main effects" if kind == "grid" else "are left out"
-    numbers = [(measure.title, spell_strongest(sweep, one)) for measure, one in found.items()]
+    numbers = [
+        (measure.title, sweep_maps.spell_strongest(sweep, one)) for measure, one in found.items()
+    ]
     numbers += [("first whole blocks of the design", f"{min(bases):,}")] if bases else []
     numbers += [(f"points of a metric that are not known within their error bars, and {how}",
                  f"up to {most}")] * bool(most)  # fmt: skip
@@ -166,7 +152,9 @@ def draw_ranked(
                 ] * bool(left)  # fmt: skip
     sentence = {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS}[kind]
     title = "what explains the spread of each metric"
-    yield DrawnFigure(draw_ranking(sweep, found), sentence, numbers, "", "ranking", title)
+    yield DrawnFigure(
+        sweep_maps.draw_ranking(sweep, found), sentence, numbers, "", "ranking", title
+    )
 
 
 def split_measures(

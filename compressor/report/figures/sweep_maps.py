@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 import plotly.graph_objects as go
 
-from compressor.analysis import Effects, grid_effects, sampled_effects
+from compressor import analysis
+from compressor.report.figures import style, sweep_panels
 from compressor.report.figures.contours import contour_lines
 from compressor.report.figures.drawing import Panel, Way, make_grid, midway, outline_cells
-from compressor.report.figures.style import BLUE, GOLD, GREY, LineStyle, fill, palette
 from compressor.report.figures.sweep_data import (
     MARKS,
     NAMES,
@@ -21,20 +21,11 @@ from compressor.report.figures.sweep_data import (
     coarse,
     spans_decades,
 )
-from compressor.report.figures.sweep_panels import (
-    CHAOTIC,
-    LIMIT,
-    RING,
-    in_lines,
-    job_keys,
-    mark_points,
-    metric_panels,
-)
 from compressor.report.limits import NO_LIMITS, Limits
 
 COLORS = "cividis"
 MAX_CELLS = 64  # along an axis
-NOTHING = fill("#f2f2f2", edge=GREY, is_hatched=True)
+NOTHING = style.fill("#f2f2f2", edge=style.GREY, is_hatched=True)
 
 
 def orient_axes(sweep: PlottedSweep) -> tuple[int, int]:
@@ -73,14 +64,14 @@ def draw_maps(
 
     status, chaotic = table(sweep.status), table(sweep.chaotic)
     cells = Cells((x, y), table(sweep.keys))
-    drawing = metric_panels(measures, 2.6, "all", "all")
+    drawing = sweep_panels.metric_panels(measures, 2.6, "all", "all")
     tables = [table(measure.of(sweep.data)) for measure in measures]
     for panel, measure, values in zip(drawing.panels, measures, tables, strict=True):
         panel.label("y", "")  # the colours have the unit
         plot_map(panel, cells, values, measure)
         plot_limits(panel, cells, values, limits.of(measure))
         mark_cells(panel, cells, status, chaotic)
-        scale_map(panel, "x", x, in_lines(x.words))
+        scale_map(panel, "x", x, sweep_panels.in_lines(x.words))
         scale_map(panel, "y", y, y.words)
         panel.x.title, panel.y.title = x.title, y.title
     if any((np.isnan(values) & (status == "ok")).any() for values in tables):
@@ -96,8 +87,8 @@ def plot_map(panel: Panel, cells: Cells, table: np.ndarray, measure: Measure) ->
     x, y = (midway(c, axis.is_log) for c, axis in zip(cells.centres, cells.axes, strict=True))
     panel.fill(*outline_cells(x, y, np.isnan(table)), NOTHING)
     panel.map(
-        *cells.centres, table, palette(COLORS), (low, top), "{}", measure.unit,
-        spans_decades(table), measure.title, job_keys(cells.keys),
+        *cells.centres, table, style.palette(COLORS), (low, top), "{}", measure.unit,
+        spans_decades(table), measure.title, sweep_panels.job_keys(cells.keys),
     )  # fmt: skip
 
 
@@ -105,16 +96,17 @@ def plot_limits(panel: Panel, cells: Cells, table: np.ndarray, limits: Sequence[
     """Draw lines where a measure is at its limits, if that is within two axes of numbers."""
     inside = tuple(one for one in limits if np.nanmin(table) < one < np.nanmax(table))
     if inside and min(table.shape) > 1 and not any(axis.is_words for axis in cells.axes):
-        panel.plot(*contour_lines(*cells.centres, table, inside), LIMIT)
+        panel.plot(*contour_lines(*cells.centres, table, inside), sweep_panels.LIMIT)
 
 
 def mark_cells(panel: Panel, cells: Cells, status: np.ndarray, chaotic: np.ndarray) -> None:
     """Draw marks in the cells of jobs that failed, were not run or are chaotic."""
     x, y = cells.centres
     marks = [(status == word, mark, NAMES[word]) for word, mark in MARKS.items()]
-    for here, mark, name in (*marks, (chaotic, replace(RING, markersize=6.0), CHAOTIC)):
+    marks.append((chaotic, replace(sweep_panels.RING, markersize=6.0), sweep_panels.CHAOTIC))
+    for here, mark, name in marks:
         rows, columns = np.nonzero(here)
-        mark_points(panel, x[columns], y[rows], cells.keys[here], mark, name)
+        sweep_panels.mark_points(panel, x[columns], y[rows], cells.keys[here], mark, name)
 
 
 def scale_map(panel: Panel, way: Way, axis: PlottedAxis, words: Sequence[str]) -> None:
@@ -128,7 +120,7 @@ def scale_map(panel: Panel, way: Way, axis: PlottedAxis, words: Sequence[str]) -
 COLUMNS = 4
 MAIN, TOTAL = "by itself (main effect)", "with its interactions (total effect)"
 RANK = "correlation of ranks"
-Ranking = dict[Measure, Effects]
+Ranking = dict[Measure, analysis.Effects]
 
 
 def ranking(sweep: PlottedSweep, measures: Sequence[Measure]) -> Ranking:
@@ -137,7 +129,10 @@ def ranking(sweep: PlottedSweep, measures: Sequence[Measure]) -> Ranking:
     found = {}
     for measure in measures:
         values = sweep.known(measure)
-        effects = grid_effects(values) if sweep.is_grid else sampled_effects(columns, values)
+        if sweep.is_grid:
+            effects = analysis.grid_effects(values)
+        else:
+            effects = analysis.sampled_effects(columns, values)
         if effects is not None and np.isfinite(effects.main).any():
             found[measure] = effects
     if any(effects.total is not None for effects in found.values()):
@@ -145,7 +140,7 @@ def ranking(sweep: PlottedSweep, measures: Sequence[Measure]) -> Ranking:
     return found
 
 
-def order_of(effects: Effects) -> list[int]:
+def order_of(effects: analysis.Effects) -> list[int]:
     """Return the numbers of the axes, the strongest first; what is unknown is last."""
     return np.argsort(-np.nan_to_num(effects.strength), kind="stable").tolist()
 
@@ -170,28 +165,28 @@ def draw_ranking(sweep: PlottedSweep, found: Ranking) -> go.Figure:
         panel.span("x", -1.05 if correlated else 0.0, 1.05 if correlated else 105.0)
         panel.y.showgrid = False
         if correlated:
-            panel.rule(LineStyle("#606060", linewidth=0.8), x=0.0)
+            panel.rule(style.LineStyle("#606060", linewidth=0.8), x=0.0)
     first = drawing.panels[0]
     first.name_ticks("y", [measure.title for measure in found])
     first.span("y", len(found) - 0.5, -0.5)
     return drawing.figure()
 
 
-def plot_bars(panel: Panel, found: Sequence[Effects], axis: int) -> None:
+def plot_bars(panel: Panel, found: Sequence[analysis.Effects], axis: int) -> None:
     """Draw the effects of one axis on all measures: total effects above, main effects below."""
     places = np.arange(len(found), dtype=float)
     if found[0].total is None:
-        bars: tuple[tuple[str, float, float, str], ...] = ((RANK, 0.0, 0.5, BLUE),)
+        bars: tuple[tuple[str, float, float, str], ...] = ((RANK, 0.0, 0.5, style.BLUE),)
     else:
-        bars = (TOTAL, -0.19, 0.36, GOLD), (MAIN, 0.19, 0.36, BLUE)
+        bars = (TOTAL, -0.19, 0.36, style.GOLD), (MAIN, 0.19, 0.36, style.BLUE)
     for name, shift, height, color in bars:
         values, low, high = np.array([part(effects, axis, name) for effects in found]).T
         errors = np.nan_to_num([values - low, high - values]).clip(min=0.0)
-        panel.bars(np.nan_to_num(values), places + shift, fill(color), name, height,
+        panel.bars(np.nan_to_num(values), places + shift, style.fill(color), name, height,
                    errors=errors if errors.any() else None)  # fmt: skip
 
 
-def part(effects: Effects, axis: int, name: str) -> tuple[float, float, float]:
+def part(effects: analysis.Effects, axis: int, name: str) -> tuple[float, float, float]:
     """Return an effect and the ends of its interval: a share in %, or a correlation."""
     values, ends = (
         (effects.main, effects.main_ends) if name != TOTAL else (effects.total, effects.total_ends)
@@ -203,7 +198,7 @@ def part(effects: Effects, axis: int, name: str) -> tuple[float, float, float]:
     return float(values[axis]) * factor, float(low), float(high)
 
 
-def spell_strongest(sweep: PlottedSweep, effects: Effects) -> str:
+def spell_strongest(sweep: PlottedSweep, effects: analysis.Effects) -> str:
     """Return the two strongest axes and what each does, with its interval where it has one.
 
     A share of the spread, cut where sampling has it below 0 or above 1, or a correlation.

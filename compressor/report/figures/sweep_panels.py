@@ -9,8 +9,8 @@ import numpy as np
 import plotly.graph_objects as go
 import xarray as xr
 
+from compressor.report.figures import style
 from compressor.report.figures.drawing import Drawing, Panel, make_grid, thin_places
-from compressor.report.figures.style import BLUE, CYCLE, RED, LineStyle, mark, palette
 from compressor.report.figures.sweep_data import (
     FOOT,
     MARKS,
@@ -31,11 +31,11 @@ PANEL_MARGIN = 0.18  # of a panel's height, below and above its values
 VISIBLE = 0.004  # of a panel's height: an error bar that is seen
 MARKERS = ("circle", "square", "diamond", "triangle-up", "triangle-down")
 CHAOTIC = "chaotic: a greatest value holds for this run only"
-LIMIT = LineStyle(RED, (4, 1.5), 1.4, 2.4)  # of a metric
-RING = mark("#d633a8", "circle", 4.5, 5, is_hollow=True, edge_width=0.8)
+LIMIT = style.LineStyle(style.RED, (4, 1.5), 1.4, 2.4)  # of a metric
+RING = style.mark("#d633a8", "circle", 4.5, 5, is_hollow=True, edge_width=0.8)
 
 
-def ring_around(size: float) -> LineStyle:
+def ring_around(size: float) -> style.LineStyle:
     """Return the ring of chaotic jobs, as large as their points, of a size, so that none hides."""
     return replace(RING, markersize=size - RING.edge_width)
 
@@ -60,8 +60,8 @@ def job_keys(keys: np.ndarray) -> tuple[str, ...]:
 
 
 def plot_jobs(
-    panel: Panel, sweep: PlottedSweep, measure: Measure, name: str, line: LineStyle, span: float,
-    listed: bool = True,
+    panel: Panel, sweep: PlottedSweep, measure: Measure, name: str, line: style.LineStyle,
+    span: float, listed: bool = True,
 ) -> None:  # fmt: skip
     """Draw a line through the jobs of one axis, and rings around those that are chaotic.
 
@@ -76,7 +76,7 @@ def plot_jobs(
 
 
 def mark_points(
-    panel: Panel, x: np.ndarray, y: np.ndarray, keys: np.ndarray, look: LineStyle, name: str
+    panel: Panel, x: np.ndarray, y: np.ndarray, keys: np.ndarray, look: style.LineStyle, name: str
 ) -> None:
     """Draw marks at points, which the legend names."""
     if x.size:
@@ -131,17 +131,20 @@ def scale_y(panel: Panel, values: np.ndarray) -> float:
     return float(high - low + 2.0 * room)
 
 
-def lines_for(axis: PlottedAxis, is_points: bool) -> dict[int, LineStyle]:
+def lines_for(axis: PlottedAxis, is_points: bool) -> dict[int, style.LineStyle]:
     """Return lines by the numbers of an axis' values, from dark to light where these are numbers.
 
     At most MAX_LINES; is_points: marks alone. Colours are those of viridis, which the colour-blind
     tell apart by lightness.
     """
     chosen = thin_places(axis.values.size, MAX_LINES).tolist()
-    lines = list(CYCLE[: len(chosen)])
-    if len(chosen) > len(CYCLE) or (not axis.is_words and len(chosen) > 1):
+    lines = list(style.CYCLE[: len(chosen)])
+    if len(chosen) > len(style.CYCLE) or (not axis.is_words and len(chosen) > 1):
         shares = np.linspace(0.0, 0.88, len(chosen))
-        lines = [LineStyle(palette("viridis", 256)[int(256 * share)], (), 1.5) for share in shares]
+        lines = [
+            style.LineStyle(style.palette("viridis", 256)[int(256 * share)], (), 1.5)
+            for share in shares
+        ]
     return {
         n: replace(line, marker=MARKERS[n % len(MARKERS)] if axis.is_words else "circle",
                    markersize=3.4, linewidth=0.0 if is_points else line.linewidth)
@@ -149,7 +152,7 @@ def lines_for(axis: PlottedAxis, is_points: bool) -> dict[int, LineStyle]:
     }  # fmt: skip
 
 
-PLAIN_LINE = LineStyle(BLUE, (), 1.4, marker="circle", markersize=3.8)
+PLAIN_LINE = style.LineStyle(style.BLUE, (), 1.4, marker="circle", markersize=3.8)
 MAX_JOBS = 1000
 
 
@@ -245,7 +248,7 @@ def grouping(sweep: PlottedSweep) -> tuple[str, list[Any], np.ndarray]:
     The first axis of words with no more of them than there are lines to tell apart.
     """
     for axis in sweep.axes:
-        if axis.is_words and len(axis.words) <= len(CYCLE):
+        if axis.is_words and len(axis.words) <= len(style.CYCLE):
             return axis.phrase, axis.words, axis.places.astype(int)
     return "", [""], np.zeros(sweep.status.shape, int)
 
@@ -262,9 +265,9 @@ def plot_points(panel: Panel, sweep: PlottedSweep, axis: int, measure: Measure) 
     for n, word in enumerate(words):
         name = name_value(phrase, word) if phrase else "a job"
         here = shown & (group == n)
-        color = CYCLE[n].color if phrase else BLUE
+        color = style.CYCLE[n].color if phrase else style.BLUE
         alpha = 0.55 if y.size < 500 else 0.35
-        dots = mark(color, MARKERS[n], POINT, edge_width=0.0, alpha=alpha)
+        dots = style.mark(color, MARKERS[n], POINT, edge_width=0.0, alpha=alpha)
         mark_points(panel, x[here], y[here], keys[here], dots, name)
     ring = shown & sweep.chaotic
     mark_points(panel, x[ring], y[ring], keys[ring], ring_around(POINT), CHAOTIC)
