@@ -76,8 +76,6 @@ def test_revolutions_are_averaged_on_the_first_one_s_angles(tmp_path, card):
         ([(0, 4, 4), (10, 5, 5)], "crank_angle_deg,pressure_bar,pressure_MPa", ": has 2 columns "
          "for the pressure of the head end"),
         ([(0, 0.4), (10, 0.5), (10, 0.6)], None, ":4: angles must rise, and 10 follows 10"),
-        ([(0, 0.4), ("x", 0.5), (10, 0.4), (20, 0.5)], None, ":3:1: crank_angle_deg: 'x' is no "
-         "number"),  # of any table: test_text_table.py
         ([(0, 0.4), (30, 0.5)], None, ":3: a gap of 30 degrees before 30; at most 20"),
         ([(angle, 0.4) for angle in range(0, 300, 10)], None, ":31: the card ends 70 degrees "
          "before its revolution does"),

@@ -166,7 +166,6 @@ def told(values) -> list[str]:
     return str(caught.value).split("\n")
 
 
-# what only values can be
 @pytest.mark.parametrize(
     ("values", "message"),
     [

@@ -17,7 +17,6 @@ SCHEMA = jsonschema.Draft202012Validator(case_schema())
 EXAMPLES = [path.read_text(encoding="utf-8") for path in CONFIGS] + blocks("yaml")
 OTHERS = [
     "joint: big_end\nclearance_mm: 0.1\ncontact: {materials: [steel, copper]}",
-    "joint: big_end\nclearance_mm: 0.1\ncontact: {materials: [[steel, copper], [steel, steel]]}",
     "solve: {accuracy: {peak_acceleration: 0.01, max_penetration: 0.05}}",
     "solve: {max_steps: {range: [10, 30, 10]}, error_bars: false}",
     "joint: both\nclearance_mm: {big_end: 0.1, small_end: [0.1, 0.2]}",

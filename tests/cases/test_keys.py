@@ -34,15 +34,13 @@ def test_a_file_gives_one_radius_or_one_for_each_joint():
     assert two.key != one.key
 
 
-@pytest.mark.parametrize(
-    "values", [{"joint": "top"}, {"clearance_mm": "0.1"}, {"clearance_mm": {"top": 1}}]
-)
-def test_a_case_is_replaced_in_the_words_of_a_case(values):
-    with pytest.raises(CaseError) as replaced:
-        replace(case(), **values)
-    with pytest.raises(CaseError) as made:
-        case(**values)
-    assert str(replaced.value) == str(made.value)
+def test_a_case_is_replaced_in_the_words_of_a_case():
+    for values in ({"joint": "top"}, {"clearance_mm": {"top": 1}}):
+        with pytest.raises(CaseError) as replaced:
+            replace(case(), **values)
+        with pytest.raises(CaseError) as made:
+            case(**values)
+        assert str(replaced.value) == str(made.value)
 
 
 def test_a_part_is_set_by_its_path_beside_the_other(read):

@@ -6,13 +6,12 @@ traceback. A folder has the case files of a careless morning, a store `results` 
 """
 
 import json
+import os
 import shlex
 import shutil
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
-from compsim import cli
 from conftest import CONFIGS, store
 
 CASES = {
@@ -152,34 +151,15 @@ def morning(tmp_path_factory):
     return place
 
 
-@pytest.fixture
-def says(morning, monkeypatch):
-    """What the program answers, and its exit code."""
-    monkeypatch.chdir(morning)
-    allowed = os_access()
-    monkeypatch.setattr("os.access", lambda path, mode: allowed(path, mode))
-
-    def run(line):
-        with CliRunner().isolation() as (out, err, _):
-            code = cli.main(shlex.split(line))
-            return code, out.getvalue().decode(), err.getvalue().decode()
-
-    return run
-
-
-def os_access():
-    """os.access, but that not even root may write to READONLY."""
-    import os
-
-    real = os.access
-    return lambda path, mode: Path(path).name != "READONLY" and real(path, mode)
-
-
 @pytest.mark.parametrize(("line", "parts"), [(line, parts) for line, *parts in MISTAKES])
-def test_a_mistake_is_answered_by_one_line_that_says_what_to_do(line, parts, says, morning):
+def test_a_mistake_is_answered_by_one_line_that_says_what_to_do(
+    line, parts, compsim, morning, monkeypatch
+):
+    monkeypatch.chdir(morning)
+    real = os.access  # but that not even root may write to READONLY
+    monkeypatch.setattr(os, "access", lambda *of: Path(of[0]).name != "READONLY" and real(*of))
     before = sorted(map(str, morning.rglob("*")))
-    code, out, err = says(line)
-    assert code == 2, err
+    out, err = compsim(*shlex.split(line), code=2)
     assert out == ""
     *usage, line = err.splitlines()
     if usage:  # of a command that is not understood: click's own

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from conftest import store_cases
 
+from compressor.cases.case import Case
+from compressor.cases.materials import paper_notes
 from compressor.store.caveats import describe_runs
 from compressor.store.reader import open_study
 from compressor.store.status import report_job, standings
@@ -14,7 +16,7 @@ SOLVE = {"duration_rev": 3, "settle_rev": 0, "accuracy": "draft", "output_step_d
 STUDY = {
     "joint": "big_end",
     "clearance_mm": 0.2,
-    "machine": {"rod_mass_kg": [4.7, 262]},
+    "machine": {"rod_mass_kg": [4.7, 262], "pin_radius_mm": 30},
     "body": {"mass_kg": 5000, "casing_mass_kg": 20},
     "sensor": {"range_m_per_s2": 0.05, "length_rev": 11},
     "solve": SOLVE,
@@ -22,6 +24,7 @@ STUDY = {
 OUTSIDE = (
     "machine.rod_mass_kg: 262 kg is outside the range that the program was judged on, 0.1 to 200 kg"
 )
+PIN = "contact.stiffness_N_per_mm15: 336000 N/mm^1.5 is the paper's, of a pin of 10 mm radius: give"
 
 
 @pytest.fixture(scope="module")
@@ -48,8 +51,17 @@ def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder
         assert ("solve.settle_rev: auto leaves it out" in text) == bool(late)
         assert clipped in text
     assert OUTSIDE in out
+    assert PIN in out
+    assert PIN in " ".join(compsim("show", "k1", "rod_mass_kg=4.7", "-r", folder).out.split())
     assert "warning: machine.rod_mass_kg: 262 kg is outside" in err  # before it runs
     assert standings(folder)[0].caveats[-1] == OUTSIDE
+
+
+def test_a_stiffness_that_is_given_is_not_the_paper_s():
+    worn = {"joint": "small_end", "clearance_mm": 0.2, "machine": {"pin_radius_mm": 35}}
+    assert list(paper_notes(Case.from_values(worn))) == ["contact.stiffness_N_per_mm15"]
+    given = {"contact": {"stiffness_N_per_mm15": 5e6}}
+    assert paper_notes(Case.from_values(worn | given)) == {}
 
 
 @pytest.mark.parametrize(
