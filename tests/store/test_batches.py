@@ -13,7 +13,6 @@ from compressor.store.batch import read_batch, read_outcomes, write_batch
 from compressor.store.files import StoreError
 from compressor.store.merge import merge_batches
 from compressor.store.reader import open_study, read_store
-from compressor.store.status import verify
 
 
 def merge_all(folder):
@@ -183,16 +182,3 @@ def test_a_job_that_is_gone_amid_reading_is_told(mixed):
     for read in (lazy.load, lambda: stored.attributes(0)):
         with pytest.raises(StoreError, match="has lost jobs meanwhile; try again"):
             read()
-
-
-# ---- folders ------------------------------------------------------------------------------------
-
-
-def test_stores_are_merged_by_copying_their_batches(tmp_path):
-    plan(tmp_path / "one", 4)
-    for name, jobs in (("one", (0, 1, 2)), ("two", (2, 3))):
-        write_batch(tmp_path / name, [made(n, samples=4) for n in jobs])
-    shutil.copytree(tmp_path / "two", tmp_path / "one", dirs_exist_ok=True)
-    assert peaks(tmp_path / "one") == {n: n for n in range(4)}
-    assert np.isfinite(open_study(tmp_path / "one").acceleration).all()
-    assert verify(tmp_path / "one") == []
