@@ -19,6 +19,7 @@ from compressor.cases.parameter import (
     BY_PART,
     OTHER_UNITS,
     PART_WORDS,
+    WRITTEN,
     Parameter,
     Problem,
     adapter_of,
@@ -124,7 +125,9 @@ DIAMETERS = (
     (r"piston|cylinder|bore|^dia", "gas.bore_mm: {whole}"),
 )
 DIAMETER = re.compile(r"(?i)(\w*_)?(diameter|diametral|dia)(_\w*)?")
-BACK_AND_FORTH = re.compile(r"(\w*_)?(piston|crosshead|plunger|reciprocating)(_\w*)?_mass(_\w*)?")
+BACK_AND_FORTH = re.compile(
+    r"(\w*_)?(piston|crosshead|plunger|reciprocating)(_\w*)?_(mass|weight)(_\w*)?"
+)
 PERCENT = re.compile(r"(\w*_)?clearance(_\w*)?_(percent|pct)")
 TWICE = "stands in place of {}: give one of the two"
 
@@ -159,7 +162,7 @@ def in_our_unit(name: str, value: Any, allowed: list[str]) -> str:
     """Return the hint at a key in another unit, such as "; write suction_MPa: 0.2"; or ""."""
     stem, _, unit = name.rpartition("_")
     for known in (stem, stem.removesuffix("_pressure")) if unit in OTHER_UNITS else ():
-        if known and (ours := f"{known}_{OTHER_UNITS[unit][0]}") in allowed:
+        if known and (ours := f"{known}_{WRITTEN[OTHER_UNITS[unit][0]]}") in allowed:
             return f"; write {ours}: {convert_other(value, unit)}"
     return ""
 
@@ -246,17 +249,23 @@ def probable_keys(name: str, group: str) -> list[str]:
     every = [*keys_of(lambda key: key), *DOUBLES]
     if exact := [key for key in every if _leaf(key) == name]:
         return exact
-    near = _nearest(name, known_keys(group), 0.6)
+    name = re.sub("(?<!counter)weight", "mass", name)
+    doubles = [_leaf(key) for key in DOUBLES if group and key.startswith(f"{group}.")]
+    near = _nearest(name, [*known_keys(group), *doubles], 0.6)
     if near:
         return [f"{group}.{near}".lstrip(".")]
     own = [key for key in every if key.startswith(f"{group}.") or not group]
     near = _nearest(name, [_leaf(key) for key in own], 0.8)
     words = {word for word in name.lower().split("_") if word}
-    return [key for key in own if _leaf(key) == near] or [
-        key
-        for key in table()
-        if key.startswith(group) and words and words <= {*re.split("[_.]", key.lower())}
-    ]
+    return (
+        [key for key in own if _leaf(key) == near]
+        or [
+            key
+            for key in table()
+            if key.startswith(group) and words and words <= {*re.split("[_.]", key.lower())}
+        ]
+        or [key for key in own if {*split_unit(_leaf(key))[0].lower().split("_")} <= words]
+    )
 
 
 def _leaf(key: str) -> str:

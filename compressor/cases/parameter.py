@@ -51,16 +51,18 @@ UNITS = {
     "deg": (math.pi, 180), "Hz": (1, 1), "rev": (1, 1),
 }  # fmt: skip
 # how a unit is written at the end of a key
-WRITTEN = {"%": "percent", "N/mm^p": "N_per_mm15", "1/mm": "per_mm", "h": "hours",
-           "mm3/(N m)": "mm3_per_N_m"}  # fmt: skip
-ENDS = {
-    WRITTEN.get(unit) or unit.replace(" ", "_").replace("/", "_per_"): unit for unit in UNITS
+WRITTEN = {unit: unit.replace(" ", "_").replace("/", "_per_") for unit in UNITS} | {
+    "%": "percent", "N/mm^p": "N_per_mm15", "1/mm": "per_mm", "h": "hours",
+    "mm3/(N m)": "mm3_per_N_m",
 }  # fmt: skip
+ENDS = {end: unit for unit, end in WRITTEN.items()}
 # other units that people write -> that of our keys, and what one of it is there
 OTHER_UNITS = {
     **{f"{unit}{end}": ("MPa", IN_MPA[unit]) for unit in ("bar", "psi") for end in ("", "a", "g")},
     "kPa": ("MPa", IN_MPA["kpa"]), "Pa": ("MPa", 1e-6), "um": ("mm", 1e-3), "cm": ("mm", 10.0),
-    "m": ("mm", 1e3), "in": ("mm", 25.4), "inch": ("mm", 25.4), "kN": ("N", 1e3),
+    "m": ("mm", 1e3), "in": ("mm", 25.4), "inch": ("mm", 25.4), "mil": ("mm", 0.0254),
+    "mils": ("mm", 0.0254), "kN": ("N", 1e3), "g": ("m/s2", 9.80665), "lb": ("kg", 0.45359237),
+    "Hz": ("rpm", 60.0), "cP": ("mPa s", 1.0),
 }  # fmt: skip
 
 Group = TypeVar("Group")
@@ -133,6 +135,11 @@ PART_WORDS = {
     "discharge": "of the discharge valves", "rotating": "of what rotates",
     "reciprocating": "of what reciprocates",
 }  # fmt: skip
+
+
+# names of pins -> the joint that each is in
+PINS = (("crank_pin", "big_end"), ("crosshead_pin", "small_end"), ("wrist_pin", "small_end"),
+        ("gudgeon_pin", "small_end"))  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -319,7 +326,7 @@ class Parameter:
         """Return the error of a value of another kind; words: of these one may be misspelt."""
         message = f"needs {self.needed}, not {quote_value(value)}"
         word = words[0][:MAX_WORD_LENGTH] if words and isinstance(words[0], str) else ""
-        aliases = dict(self.aliases)
+        aliases = dict(self.aliases) | {name: one for name, one in PINS if one in self.choices}
         if hint := did_you_mean(word, [*aliases, *self.words], aliases):
             return f"{message}; {hint}"
         number = AS_NUMBER.fullmatch(word) if self.is_number else None
