@@ -11,10 +11,10 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-import venv
 from pathlib import Path
 
-ROOT = Path(__file__).parent.parent
+from release import ROOT, install, make_environment
+
 NEEDED = ("pyproject.toml", "README.md", "cmd", "compressor")
 BOUND = re.compile(r"([A-Za-z0-9_-]+)>=([0-9.]+)(,<.*)?")
 SAMPLE = ("cases", "cmd", "report", "store", "sweep/test_sweep.py", "physics/test_march.py")
@@ -25,10 +25,7 @@ CASE = "{joint: big_end, clearance_mm: 0.2, solve: {duration_rev: 2, accuracy: d
 
 
 def oldest_versions(requirements):
-    """Return the lower bound of each requirement, as pip pins it.
-
-    Raises ValueError where one has no bound.
-    """
+    """Return the lower bound of each requirement, as pip pins it; ValueError where one has none."""
     found = []
     for one in requirements:
         bound = BOUND.fullmatch(one)
@@ -42,30 +39,20 @@ def try_oldest(place, with_tests):
     """Install the program with its oldest libraries into a folder and run it; raises on failure."""
     with open(ROOT / "pyproject.toml", "rb") as file:
         pins = oldest_versions(tomllib.load(file)["project"]["dependencies"])
-    venv.create(place / "env", with_pip=True)
-    python = place / "env" / "bin" / "python"
     source = place / "source"  # pip leaves files beside what it builds
     source.mkdir()
     for name in NEEDED:
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, source / name)
-
-    def call(*words, **options):
-        print("$", *words, flush=True)
-        subprocess.run(words, check=True, **options)
-
-    install = (python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check")
-    call(*install, *pins, *(TOOLS if with_tests else ()))
-    call(*install, "--no-deps", str(source))
-    compsim = place / "env" / "bin" / "compsim"
+    call = make_environment(place)
+    install(call, *pins, *(TOOLS if with_tests else ()))
+    install(call, "--no-deps", source)
     (place / "oldest.yaml").write_text(CASE, encoding="utf-8")
-    call(compsim, "--version", cwd=place)
-    call(compsim, "--help", cwd=place)
-    call(compsim, "run", "oldest.yaml", "-j", "1", cwd=place)
-    call(compsim, "verify", cwd=place)
+    for words in ("--version", "--help", "run oldest.yaml -j 1", "verify"):
+        call("compsim", *words.split())
     if with_tests:
-        tests = [str(ROOT / "tests" / name) for name in SAMPLE]
-        call(python, "-m", "pytest", "-n", "2", *tests, cwd=ROOT)
+        tests = [ROOT / "tests" / name for name in SAMPLE]
+        call("python", "-m", "pytest", "-n", "2", *tests, cwd=ROOT)
 
 
 if __name__ == "__main__":

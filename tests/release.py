@@ -14,6 +14,23 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 
 
+def make_environment(place):
+    """Make an environment `env` in a folder; returns how its programs are called from there."""
+    venv.create(place / "env", with_pip=True)
+    alone = {name: text for name, text in os.environ.items() if not name.startswith("PYTHON")}
+
+    def call(program, *words, cwd=place):
+        print("$", program, *words, flush=True)
+        path = place / "env" / "bin" / program
+        subprocess.run([path, *words], check=True, cwd=cwd, env=alone)
+
+    return call
+
+
+def install(call, *words):
+    call("python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *words)
+
+
 def data_files():
     """Yield what the program reads beside its Python: templates, examples, the marker of types."""
     tracked = subprocess.run(
@@ -30,20 +47,10 @@ def try_wheel(wheel, place):
     missing = [name for name in data_files() if name not in packed]
     if missing:
         raise FileNotFoundError(f"not in {wheel.name}: {', '.join(missing)}")
-    venv.create(place / "env", with_pip=True)
-    alone = {name: text for name, text in os.environ.items() if not name.startswith("PYTHON")}
-
-    def call(program, *words):
-        print("$", program, *words, flush=True)
-        path = place / "env" / "bin" / program
-        subprocess.run([path, *words], check=True, cwd=place, env=alone)
-
-    call("python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel)
-    call("compsim", "--version")
-    call("compsim", "init", "paper")
-    call("compsim", "run", "paper.yaml")
-    call("compsim", "report")
-    call("compsim", "verify")
+    call = make_environment(place)
+    install(call, wheel)
+    for words in ("--version", "init paper", "run paper.yaml", "report", "verify"):
+        call("compsim", *words.split())
     if not (place / "report" / "index.html").exists():
         raise FileNotFoundError("report/index.html")
 

@@ -9,7 +9,6 @@ import json
 import time
 from pathlib import Path
 
-import numpy as np
 from result_pages import keep, provenance, run_campaign
 
 from compressor.analysis import RULES, cases_of
@@ -21,8 +20,6 @@ from compressor.solve.simulate import simulate
 from compressor.store.studies import find_study
 from compressor.studies.claims import (
     CLAIMS,
-    RECIPROCATING,
-    ROD,
     assumptions,
     draw_map,
     judge_machines,
@@ -48,7 +45,6 @@ def main(target):
         seconds = json.loads(target.read_text(encoding="utf-8"))["map"]["seconds"]
     plane = mass_plane(judged)
     found["map"] = {**counted(judged), "seconds": seconds}
-    found["consistent"] = most_consistent(plane)
     print(f"map: {seconds} s", flush=True)
     default = judged_alone(Case.from_values({}))
     found["default"] = {name: default[name] for name in ("margin", "error")}
@@ -61,23 +57,6 @@ def main(target):
     found["agreeing"] = agreeing()
     keep(target, found)
     target.with_suffix(".svg").write_bytes(render(draw_map(plane), "svg"))
-
-
-def most_consistent(plane):
-    """The machine around which the least margin, at its neighbours too, is greatest.
-
-    Claims 1 and 2, which do not depend on masses, are left aside, and so are claims that hold at no
-    machine. Machines at the plane's edge are not chosen.
-    """
-    held = (plane["margin"] >= 0.0).any([ROD, RECIPROCATING])
-    claims = [claim for claim in CLAIMS[2:] if held.sel(claim=claim)]
-    margin = plane["margin"].sel(claim=claims).min("claim", skipna=False).fillna(-np.inf)
-    around = margin.rolling({ROD: 3, RECIPROCATING: 3}, center=True).min().fillna(-np.inf)
-    best = around.isel(around.argmax(...))
-    return {
-        "rod_mass": float(best[ROD]), "reciprocating_mass": float(best[RECIPROCATING]),
-        "least": float(best), "claims": claims,
-    }  # fmt: skip
 
 
 def judged_study(name, overrides=()):

@@ -87,13 +87,8 @@ def test_a_hundred_chaotic_cases_know_their_rms():
     assert max(row["scipy"]["apart"]) < 4.0  # exceeded by chance once in 2,000
 
 
-def test_the_examples_are_the_machines_of_the_map_of_claims():
-    found, (study,) = kept("claims.json"), load_studies(templates()["consistent"].path)
-    machine, best = study.cases[0].machine, found["consistent"]
-    masses = machine.rod_mass_kg, machine.reciprocating_mass_kg
-    assert masses == pytest.approx((best["rod_mass"], best["reciprocating_mass"]))
-    assert (best["least"] > 0.05, best["claims"]) == (True, [3, 4, 5, 6, 8])
-    agreeing = found["agreeing"]  # beyond its errors, by what its comment says
+def test_all_claims_hold_in_the_agreeing_machine():
+    agreeing = kept("claims.json")["agreeing"]  # beyond its errors, by what its comment says
     assert all(m >= e for m, e in zip(agreeing["margin"], agreeing["error"], strict=True))
     assert 100 * agreeing["margin"][7] == pytest.approx(1.1, abs=0.05)
 

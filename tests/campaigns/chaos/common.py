@@ -40,43 +40,30 @@ LEAN = {  # of a quick job
     "duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9,
     "error_bars": False,
 }  # fmt: skip
-STUDIES = {
-    "series": {"joint": "big_end", "clearance_mm": [0.1, 0.2]},
-    "metrics": {
-        "joint": "small_end", "clearance_mm": [0.1, 0.2, 0.3], "machine": {"rod_mass_kg": [4, 5]},
-        "output": {"keep": "metrics"},
-    },
-    "failing": {
-        "joint": "both", "clearance_mm": 0.1, "solve": {"max_steps": 3},
-        "output": {"keep": "metrics"},
-    },
-}  # fmt: skip
 
 
-# ---- case files and stores ----------------------------------------------------------------------
-
-
-def case_file(folder, name, **values):
-    """A case file of quick jobs: its path."""
+def rods_file(folder, name, masses, keep="metrics", **solve):
+    """A case file of quick big-end jobs, one a rod mass (kg): its path."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.yaml"
-    path.write_text(json.dumps(values | {"solve": LEAN | values.get("solve", {})}))
+    path.write_text(json.dumps({
+        "joint": "big_end", "clearance_mm": 0.1, "machine": {"rod_mass_kg": [*masses]},
+        "output": {"keep": keep}, "solve": LEAN | solve,
+    }))  # fmt: skip
     return path
-
-
-def rods_file(folder, name, masses, keep="metrics", **more):
-    """A case file of quick big-end jobs, one a rod mass (kg): its path."""
-    rods = {"joint": "big_end", "clearance_mm": 0.1, "machine": {"rod_mass_kg": [*masses]}}
-    return case_file(folder, name, **rods, output={"keep": keep}, **more)
 
 
 @cache
 def complete_store(folder):
-    """A store with all jobs of `STUDIES`, their case files, and all that is stored.
+    """A store with series, metrics and a failed job, its case files, and all that is stored.
 
     It also compiles and imports what forks need.
     """
-    cases = [case_file(folder / "cases", name, **values) for name, values in STUDIES.items()]
+    cases = [
+        rods_file(folder / "cases", "series", [4, 5], "series"),
+        rods_file(folder / "cases", "metrics", [4.1, 4.2, 4.3, 4.4, 4.5, 4.6]),
+        rods_file(folder / "cases", "failing", [4.7], max_steps=3),
+    ]
     SWEEP.run_job(load_studies(cases[0])[0].cases[0])
 
     def fill():
@@ -151,9 +138,6 @@ def mounted(place, *words):
         yield place
     finally:
         call("umount", "-l", place)
-
-
-# ---- forks and commands -------------------------------------------------------------------------
 
 
 class Ended(NamedTuple):

@@ -10,17 +10,7 @@ import os
 import random
 import shutil
 
-from chaos.common import (
-    Said,
-    call,
-    command,
-    complete_store,
-    differing,
-    forked,
-    mounted,
-    run_here,
-    whole,
-)
+from chaos import common
 from compressor.store import merge
 from compressor.store.batch import read_outcomes, write_batch
 
@@ -50,7 +40,7 @@ random.Random(1).shuffle(PLANNED)
 def unable(folder):
     """Why nothing can be mounted here, "" where it can."""
     try:
-        with mounted(folder / "try", *TMPFS, "none"):
+        with common.mounted(folder / "try", *TMPFS, "none"):
             return ""
     except (OSError, RuntimeError) as error:
         return str(error)
@@ -76,20 +66,20 @@ def say(words):
     """What a command says in a process of its own."""
 
     def work():
-        run_here()
+        common.run_here()
         merge.MAX_SMALL = 1
-        return command(*words)
+        return common.command(*words)
 
-    ended = forked(work)
-    return ended.result or Said(-1, "", ended.death)
+    ended = common.forked(work)
+    return ended.result or common.Said(-1, "", ended.death)
 
 
 def trial(place, draw, number, counts):
     """Give a command on a tmpfs that is too small, or read-only; then on a better one."""
     name, kind, more = PLANNED[number % len(PLANNED)]
-    complete, cases, expected = complete_store(place.parent)
+    complete, cases, expected = common.complete_store(place.parent)
     how, text = SCENES[name]
-    with mounted(place / "disk", *TMPFS, "-o", AMPLE, "none") as disk:
+    with common.mounted(place / "disk", *TMPFS, "-o", AMPLE, "none") as disk:
         store, known = disk / "store", {"CASES": cases, "KEY": expected["series"].keys[:1]}
         prepare(how, complete, store)
         words = text.replace("FOLDER", str(store)).split()
@@ -98,18 +88,18 @@ def trial(place, draw, number, counts):
         pages, files = used.f_blocks - used.f_bfree, used.f_files - used.f_ffree
         options = {"ro": "ro", "pages": f"size={(pages + more) * used.f_frsize}",
                    "files": f"size=64m,nr_inodes={files + more}"}  # fmt: skip
-        call("mount", "-o", f"remount,{options[kind]}", disk)
+        common.call("mount", "-o", f"remount,{options[kind]}", disk)
         said, problem = say(words), ""
         is_ok = said.code in (0, 3)
         is_told = is_ok or (name not in READERS and said.code in (2, 5) and is_named(said.err))
         counts["limits that were not met" if is_ok else "named errors"] += 1
-        call("mount", "-o", f"remount,rw,{AMPLE}", disk)
-        again, found = say(words), forked(lambda: whole(store))
+        common.call("mount", "-o", f"remount,rw,{AMPLE}", disk)
+        again, found = say(words), common.forked(lambda: common.whole(store))
     if "Traceback" in said.err or not is_told:
         problem = f"exit code {said.code}: {said.err}"
     elif again.code not in (0, 3):
         problem = f"given again: exit code {again.code}: {again.err}"
-    elif different := found.death or differing(found.result, expected):
+    elif different := found.death or common.differing(found.result, expected):
         problem = f"not completed: {different}"
     return problem and f"{name} on tmpfs, {kind} {more}: {problem}"
 

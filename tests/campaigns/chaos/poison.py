@@ -47,8 +47,8 @@ def mixed(folder, keep, draw):
     names, good, bad = [], set(), {}
     for endless, part in itertools.groupby(jobs, key=lambda job: job[1] in ENDLESS):
         masses, kinds = zip(*part, strict=True)
-        solve = {"timeout_s": SECONDS if endless else 600}
-        path = rods_file(folder, f"part-{len(names)}", masses, keep, solve=solve)
+        timeout = SECONDS if endless else 600
+        path = rods_file(folder, f"part-{len(names)}", masses, keep, timeout_s=timeout)
         names.append(path.name)
         (study,) = load_studies(path)
         bad |= {key: kind for key, kind in zip(study.keys, kinds, strict=True) if kind}

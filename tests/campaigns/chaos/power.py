@@ -21,18 +21,7 @@ import struct
 import time
 from functools import cache
 
-from chaos.common import (
-    FORK,
-    SWEEP,
-    call,
-    differing,
-    forked,
-    fresh,
-    mounted,
-    rods_file,
-    run_here,
-    whole,
-)
+from chaos import common
 from compressor.cases.load import load_studies
 from compressor.store import merge
 from compressor.store.status import verify
@@ -54,12 +43,12 @@ def unable(folder):
     with open(image, "wb") as file:
         file.truncate(IMAGE_BYTES)
     try:
-        call("mkfs.ext4", "-q", "-F", "-E", "lazy_itable_init=0,lazy_journal_init=0", image)
-        with fresh(folder) as place:
+        common.call("mkfs.ext4", "-q", "-F", "-E", "lazy_itable_init=0,lazy_journal_init=0", image)
+        with common.fresh(folder) as place:
             shutil.copyfile(image, place / "disk.img")
-            with mounted(place / "disk", "-o", "loop", place / "disk.img") as disk:
+            with common.mounted(place / "disk", "-o", "loop", place / "disk.img") as disk:
                 cut(disk)
-            call("e2fsck", "-fy", place / "disk.img", good=(0, 1))
+            common.call("e2fsck", "-fy", place / "disk.img", good=(0, 1))
     except (RuntimeError, OSError) as error:
         return str(error)
     return ""
@@ -88,18 +77,19 @@ def next_of(reader, seconds):
 def arranged(folder):
     """The studies, and what an undisturbed sweep stores; compiles what all need."""
     files = [
-        rods_file(folder, keep, [3 + n / 500 for n in range(JOBS[keep])], keep) for keep in JOBS
+        common.rods_file(folder, keep, [3 + n / 500 for n in range(JOBS[keep])], keep)
+        for keep in JOBS
     ]
     studies = load_studies(*files)
-    SWEEP.run_job(studies[0].cases[0])
-    return studies, forked(lambda: swept(studies, folder / "whole"), 600).result
+    common.SWEEP.run_job(studies[0].cases[0])
+    return studies, common.forked(lambda: swept(studies, folder / "whole"), 600).result
 
 
 def swept(studies, store):
     """Run the sweep here; what is stored then."""
-    run_here(20)
-    SWEEP.sweep(studies, store, 1)
-    return whole(store)
+    common.run_here(20)
+    common.SWEEP.sweep(studies, store, 1)
+    return common.whole(store)
 
 
 def write(studies, store, channel, is_synced, every):
@@ -116,8 +106,8 @@ def write(studies, store, channel, is_synced, every):
             if next(numbers) % every == 0:  # more often than the program does
                 merge.merge_batches(store)
 
-        run_here(20, stored)
-        SWEEP.sweep(studies, store, 1)
+        common.run_here(20, stored)
+        common.SWEEP.sweep(studies, store, 1)
 
 
 def disturb(place, studies, draw, is_synced):
@@ -126,9 +116,9 @@ def disturb(place, studies, draw, is_synced):
     options, wait = draw.choice(OPTIONS), draw.uniform(0, MAX_SECONDS)
     promptly = not is_synced or draw.random() < 0.5  # upon an acknowledgement
     reader, channel = os.pipe()
-    with mounted(place / "disk", "-o", f"loop,{options}", place / "disk.img") as disk:
+    with common.mounted(place / "disk", "-o", f"loop,{options}", place / "disk.img") as disk:
         arguments = studies, disk / "store", channel, is_synced, draw.choice((8, math.inf))
-        child = FORK.Process(target=write, args=arguments)
+        child = common.FORK.Process(target=write, args=arguments)
         child.start()
         os.close(channel)
         told = next_of(reader, 60)
@@ -154,12 +144,12 @@ def cut_once(place, draw, is_synced=True):
     """Cut the power: the acknowledged keys, those that are lost, and what resuming misses."""
     studies, expected = arranged(place.parent)
     acknowledged = disturb(place, studies, draw, is_synced)
-    call("e2fsck", "-fy", place / "cut.img", good=(0, 1))
-    with mounted(place / "copy", "-o", "loop", place / "cut.img") as disk:
-        ended = forked(lambda: acknowledged - intact(disk / "store"))
+    common.call("e2fsck", "-fy", place / "cut.img", good=(0, 1))
+    with common.mounted(place / "copy", "-o", "loop", place / "cut.img") as disk:
+        ended = common.forked(lambda: acknowledged - intact(disk / "store"))
         lost = acknowledged if ended.death else ended.result
-        again = forked(lambda: swept(studies, disk / "store"))
-        return acknowledged, lost, again.death or differing(again.result, expected)
+        again = common.forked(lambda: swept(studies, disk / "store"))
+        return acknowledged, lost, again.death or common.differing(again.result, expected)
 
 
 def trial(place, draw, number, counts):
