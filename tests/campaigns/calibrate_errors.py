@@ -7,9 +7,8 @@ how long they would be. From these the shares of `compressor.metrics` and
 `compressor.solve.error_bars` were chosen; `make accuracy` judges them on other seeds.
 """
 
-import numpy as np
 from joblib import Parallel, delayed
-from measure_accuracy import CONTACT, EXACT, percentiles
+from measure_accuracy import errors_and_bars, judge_bars, percentiles
 from random_cases import strangers
 from result_pages import keep, provenance, run_campaign
 
@@ -53,19 +52,11 @@ def one_case(values):
                 "error": float(distances(truth.samples, here.samples)["acceleration"]),
                 "distance": float(apart["acceleration"]),
                 "metrics": {
-                    name: relative(name, here.metrics, truth.metrics, found[name])
+                    name: errors_and_bars(name, here.metrics, truth.metrics, found)
                     for name in METRICS
                 },
             })  # fmt: skip
     return rows
-
-
-def relative(name, metrics, truth, bar):
-    """Errors and bars of a metric, of joints with contact where it is one of contact."""
-    there = np.ravel(truth["max_penetration"]) != 0 if name in CONTACT else slice(None)
-    value, sure, length = (np.ravel(x)[there] for x in (metrics[name], truth[name], bar))
-    error = np.abs(value - sure)
-    return np.where(error > EXACT * np.abs(sure), error, 0.0), length
 
 
 def series_row(rows, ratio):
@@ -84,14 +75,10 @@ def series_row(rows, ratio):
 
 
 def metric_row(rows, name, ratio):
-    """Share of errors within their bars, and bar over error in the median, at a ratio."""
-    pairs = [row["metrics"][name] for row in rows if row["ratio"] == ratio]
-    error, bar = (np.concatenate(part) for part in zip(*pairs, strict=True))
-    wrong = error > 0
+    """What the bars of a metric are worth at a ratio."""
     return {
         "ratio": ratio,
-        "within": np.mean(error <= bar),
-        "tightness": np.median(bar[wrong] / error[wrong]),
+        **judge_bars([row["metrics"][name] for row in rows if row["ratio"] == ratio]),
     }
 
 

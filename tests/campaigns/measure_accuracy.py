@@ -154,25 +154,23 @@ def word_row(word, paper, measured):
     }
 
 
-def bar_row(word, name, measured):
-    """How many true errors lie within their bars, and how much longer the bars are (median).
+def errors_and_bars(name, found, truth, bars):
+    """Errors and bars of a metric, of joints with contact where it is one of contact.
 
-    Of runs that keep their promise. Every joint and axis counts, but not the contact of ideal
-    joints, which is exact. Tightness is over errors above rounding.
+    Every joint and axis counts, but not the contact of ideal joints, which is exact.
     """
-    errors_, bars = [], []
-    for case in measured:
-        row = case["words"][word]
-        if row["promise"] != "kept":
-            continue
-        found, truth, bar = (
-            np.ravel(x[name]) for x in (row["metrics"], case["truth"], row["bars"])
-        )
-        there = case["truth"]["max_penetration"] != 0 if name in CONTACT else slice(None)
-        error = np.abs(found - truth)
-        errors_.append(np.where(error > EXACT * np.abs(truth), error, 0.0)[there])
-        bars.append(bar[there])
-    error, bar = np.concatenate(errors_), np.concatenate(bars)
+    there = np.ravel(truth["max_penetration"]) != 0 if name in CONTACT else slice(None)
+    value, sure, bar = (np.ravel(each[name])[there] for each in (found, truth, bars))
+    error = np.abs(value - sure)
+    return np.where(error > EXACT * np.abs(sure), error, 0.0), bar
+
+
+def judge_bars(pairs):
+    """How many errors lie within their bars, and how much longer the bars are (median).
+
+    Tightness is over errors above rounding.
+    """
+    error, bar = (np.concatenate(part) for part in zip(*pairs, strict=True))
     wrong = error > 0
     return {
         "within": np.mean(error <= bar),
@@ -180,6 +178,15 @@ def bar_row(word, name, measured):
         "wrong": int(wrong.sum()),
         "of": error.size,
     }
+
+
+def bar_row(word, name, measured):
+    """What the bars of a metric are worth in the runs that keep their promise."""
+    rows = [(case["words"][word], case["truth"]) for case in measured]
+    return judge_bars([
+        errors_and_bars(name, row["metrics"], truth, row["bars"])
+        for row, truth in rows if row["promise"] == "kept"
+    ])  # fmt: skip
 
 
 def main(target, jobs=2, count=334, seeds=SEEDS):

@@ -15,7 +15,6 @@ import json
 import math
 import random
 import re
-import shutil
 import signal
 import statistics
 import subprocess
@@ -47,9 +46,8 @@ COMMANDS = {
 ROUNDS = 5
 WORKERS = 2
 JOBS = 100_000
-KILLS = 3
+KILLS = (False, True, True)  # whether its workers are killed, too
 SHORT = {"settle_rev": 0, "duration_rev": 1}
-SEED = 1
 LONGEST = 4 * 3600.0  # s
 LOOK = 0.5  # s between two looks at memory
 PEAK = re.compile(r"VmHWM:\s*(\d+) kB")
@@ -81,110 +79,70 @@ def many(jobs):
 class Sweep:
     """The sweep in a folder, run once or several times."""
 
-    def __init__(self, folder, jobs):
-        self.folder, self.jobs = folder, jobs
-        self.peaks = {"parent": 0, "worker": 0}  # kB
+    def __init__(self, folder, jobs, peaks):
+        self.folder, self.jobs, self.peaks = folder, jobs, peaks
         folder.mkdir()
         (folder / "many.yaml").write_text(many(jobs), encoding="utf-8")
 
-    def start(self):
-        """Start the real command."""
-        limit = ["--max-jobs", str(self.jobs)]
-        return Run(["run", "many.yaml", "-j", str(WORKERS), *limit], self.folder, real=True)
-
-    def watch(self, run, seconds):
-        """Take note of memory for so long, or until the run ends; whether it runs."""
-        until = time.monotonic() + seconds
+    def run(self, seconds=LONGEST):
+        """Run the real command for so long, or to its end; memory is noted. The run."""
+        words = ["run", "many.yaml", "-j", str(WORKERS), "--max-jobs", str(self.jobs)]
+        run, until = Run(words, self.folder, real=True), time.monotonic() + seconds
         while run.watch(min(LOOK, until - time.monotonic())) and time.monotonic() < until:
             for pid in members(run.pid):
                 with contextlib.suppress(OSError):
                     if found := PEAK.search(Path(f"/proc/{pid}/status").read_text()):
                         whose = "parent" if pid == run.pid else "worker"
                         self.peaks[whose] = max(self.peaks[whose], int(found[1]))
-        return run.runs()
+        return run
 
     def complete(self):
         """Seconds of a run to its end."""
         began = time.monotonic()
-        run = self.start()
-        assert not self.watch(run, LONGEST), "the sweep takes too long"
+        run = self.run()
         code = run.finish()
         assert code == 0, run.text()[-2000:]
         return time.monotonic() - began
 
     def kill(self, seconds, whole):
         """Start it and kill it after a time: jobs that it had told of, and that are stored."""
-        run = self.start()
-        assert self.watch(run, seconds), f"it ended within {seconds:.1f} s, before its kill"
+        run = self.run(seconds)
         run.send(signal.SIGKILL, whole)
         code = run.finish()
         assert code == -signal.SIGKILL, f"{code}: {run.text()[-2000:]}"
         stored = len(read_store(self.folder / "results"))
         assert stored >= run.told(), f"told of {run.told()} jobs, {stored} are stored"
         assert not damage(self.folder / "results"), damage(self.folder / "results")
-        return {
-            "after_s": round(seconds, 2), "of": "all" if whole else "parent",
-            "told": run.told(), "stored": stored,
-        }  # fmt: skip
-
-
-def disturbed(sweep, seconds):
-    """Kill and resume a sweep that takes so many seconds: its kills, seconds of its last run.
-
-    The kills are at random moments of one undisturbed run, cut into equal parts.
-    """
-    draw = random.Random(SEED)
-    part = seconds / (KILLS + 1)
-    kills = [sweep.kill(draw.uniform(0.3, 1) * part, draw.random() < 0.5) for _ in range(KILLS)]
-    return kills, sweep.complete()
-
-
-def size(folder):
-    """Bytes and files of a store."""
-    files = [path for path in folder.rglob("*") if path.is_file()]
-    return sum(path.stat().st_size for path in files), len(files)
+        return {"of": "all" if whole else "parent", "told": run.told(), "stored": stored}
 
 
 def main(target, jobs=JOBS):
-    place = Path(tempfile.mkdtemp(prefix="sweep-bench-", dir=".")).absolute()
-    try:
-        calm, torn = Sweep(place / "undisturbed", jobs), Sweep(place / "killed", jobs)
+    peaks = {"parent": 0, "worker": 0}  # kB
+    with tempfile.TemporaryDirectory(prefix="sweep-bench-", dir=".") as place:
+        calm, torn = (
+            Sweep(Path(place, name).absolute(), jobs, peaks) for name in ("undisturbed", "killed")
+        )
         seconds = calm.complete()
         again = calm.complete()
-        kills, last = disturbed(torn, seconds)
-        results = place / "killed" / "results"
+        draw = random.Random(1)
+        kills = [torn.kill(draw.uniform(0.1, 0.25) * seconds, whole) for whole in KILLS]
+        last, results = torn.complete(), torn.folder / "results"
         assert not damage(results), damage(results)
         began = time.monotonic()
         study = open_study(results)
         opened = time.monotonic() - began
-        count, stored = int((study.status == "ok").sum()), read_store(results)
-        assert count == study.status.size == len(stored), "not complete"
-        solver = stored.numbers(np.arange(count), ["seconds"])["seconds"].sum()
-        same = contents(place / "undisturbed" / "results") == contents(results)
+        assert (study.status == "ok").sum() == study.status.size == jobs, "not complete"
+        same = contents(calm.folder / "results") == contents(results)
         assert same, "the resumed study differs from the undisturbed one"
-        total, files = size(results)
-    finally:
-        shutil.rmtree(place)
-    peaks = {name: max(calm.peaks[name], torn.peaks[name]) for name in calm.peaks}
-    kept = {
-        **provenance("make sweep-bench"),
-        "start": time_startup(),
-        "jobs": count,
-        "revolutions_a_job": SHORT["duration_rev"],
-        "workers": WORKERS,
-        "wall_s": round(seconds, 1),
-        "jobs_per_s": round(count / seconds, 1),
-        "again_s": round(again, 2),
-        "kernel_share": round(float(solver) / WORKERS / seconds, 3),
-        "kills": kills,
-        "last_run_s": round(last, 1),
+        sizes = [path.stat().st_size for path in results.rglob("*") if path.is_file()]
+    keep(target, {
+        **provenance("make sweep-bench"), "start": time_startup(), "jobs": jobs,
+        "workers": WORKERS, "wall_s": round(seconds, 1), "jobs_per_s": round(jobs / seconds, 1),
+        "again_s": round(again, 2), "kills": kills, "last_run_s": round(last, 1),
         "bit_equal": same,
         "peak_MB": {name: round(peak * 1024 / 1e6) for name, peak in peaks.items()},
-        "bytes": total,
-        "files": files,
-        "open_study_s": round(opened, 3),
-    }
-    keep(target, kept)
+        "bytes": sum(sizes), "files": len(sizes), "open_study_s": round(opened, 3),
+    })  # fmt: skip
 
 
 if __name__ == "__main__":

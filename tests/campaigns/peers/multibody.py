@@ -136,6 +136,11 @@ class Builder:
         self.mbs = self.container.AddSystem()
         self.keep = [self.container]
 
+    def add(self, kind, **how):
+        """Add an item of a kind, such as Node1D."""
+        begin = next(one for one in ("Node", "Object", "Marker", "Sensor") if kind.startswith(one))
+        return getattr(self.mbs, f"Add{begin}")(getattr(self.items, kind)(**how))
+
     def symbolic(self, function, name, item):
         made = self.utilities.CreateSymbolicUserFunction(
             self.mbs, function, name, itemTypeName=item
@@ -145,87 +150,67 @@ class Builder:
 
     def crank(self):
         """Marker of the crankpin on a rotor that nothing can slow down."""
-        node = self.mbs.AddNode(self.items.Node1D(initialVelocities=[OMEGA]))
-        rotor = self.mbs.AddObject(
-            self.items.ObjectRotationalMass1D(nodeNumber=node, inertia=HEAVY)
-        )
-        pin = self.items.MarkerBodyRigid(bodyNumber=rotor, localPosition=[R, 0, 0])
-        return self.mbs.AddMarker(pin)
+        node = self.add("Node1D", initialVelocities=[OMEGA])
+        rotor = self.add("ObjectRotationalMass1D", nodeNumber=node, inertia=HEAVY)
+        return self.add("MarkerBodyRigid", bodyNumber=rotor, localPosition=[R, 0, 0])
 
     def crosshead(self):
         """Node and pin marker of a sliding mass."""
-        node = self.mbs.AddNode(self.items.Node1D(referenceCoordinates=[R + L]))
-        mass = self.mbs.AddObject(self.items.ObjectMass1D(nodeNumber=node, mass=M_CROSS))
-        return node, self.mbs.AddMarker(self.items.MarkerBodyRigid(bodyNumber=mass))
+        node = self.add("Node1D", referenceCoordinates=[R + L])
+        mass = self.add("ObjectMass1D", nodeNumber=node, mass=M_CROSS)
+        return node, self.add("MarkerBodyRigid", bodyNumber=mass)
 
     def free_rod(self):
         """Markers of both bores of a rod that hangs on nothing."""
         speed = [0, R * OMEGA * (1 - A / L), SPIN]
-        node = self.mbs.AddNode(
-            self.items.NodeRigidBody2D(referenceCoordinates=[R + A, 0, 0], initialVelocities=speed)
+        node = self.add(
+            "NodeRigidBody2D", referenceCoordinates=[R + A, 0, 0], initialVelocities=speed
         )
-        rod = self.mbs.AddObject(
-            self.items.ObjectRigidBody2D(nodeNumber=node, mass=M_ROD, inertia=I_ROD)
-        )
+        rod = self.add("ObjectRigidBody2D", nodeNumber=node, mass=M_ROD, inertia=I_ROD)
         return [
-            self.mbs.AddMarker(
-                self.items.MarkerBodyRigid(bodyNumber=rod, localPosition=[arm, 0, 0])
-            )
+            self.add("MarkerBodyRigid", bodyNumber=rod, localPosition=[arm, 0, 0])
             for arm in (-A, B)
         ]
 
     def hanging_rod(self, first, mass, inertia, start, rates, shift, centre, bore):
         """Node and bore marker of a rod on a first link: a slider or a crank, by its joint."""
         exu, eye, zero = self.exu, np.eye(3), [0, 0, 0]
-        node = self.mbs.AddNode(
-            self.items.NodeGenericODE2(
-                referenceCoordinates=start, initialCoordinates=[0.0, 0.0],
-                initialCoordinates_t=rates, numberOfODE2Coordinates=2,
-            )
+        node = self.add(
+            "NodeGenericODE2",
+            referenceCoordinates=start, initialCoordinates=[0.0, 0.0],
+            initialCoordinates_t=rates, numberOfODE2Coordinates=2,
         )  # fmt: skip
-        tree = self.mbs.AddObject(
-            self.items.ObjectKinematicTree(
-                nodeNumber=node, jointTypes=[first, exu.JointType.RevoluteZ], linkParents=[-1, 0],
-                jointTransformations=exu.Matrix3DList([eye, eye]),
-                jointOffsets=exu.Vector3DList([zero, [shift, 0, 0]]),
-                linkInertiasCOM=exu.Matrix3DList([inertia * eye, I_ROD * eye]),
-                linkCOMs=exu.Vector3DList([zero, [centre, 0, 0]]), linkMasses=[mass, M_ROD],
-            )
+        tree = self.add(
+            "ObjectKinematicTree",
+            nodeNumber=node, jointTypes=[first, exu.JointType.RevoluteZ], linkParents=[-1, 0],
+            jointTransformations=exu.Matrix3DList([eye, eye]),
+            jointOffsets=exu.Vector3DList([zero, [shift, 0, 0]]),
+            linkInertiasCOM=exu.Matrix3DList([inertia * eye, I_ROD * eye]),
+            linkCOMs=exu.Vector3DList([zero, [centre, 0, 0]]), linkMasses=[mass, M_ROD],
         )  # fmt: skip
-        marker = self.items.MarkerKinematicTreeRigid(
-            objectNumber=tree, linkNumber=1, localPosition=[bore, 0, 0]
+        place = [bore, 0, 0]
+        return node, self.add(
+            "MarkerKinematicTreeRigid", objectNumber=tree, linkNumber=1, localPosition=place
         )
-        return node, self.mbs.AddMarker(marker)
 
     def joint(self, journal, bore, journal_spin):
         """A clearance joint between two markers."""
         item = "ObjectConnectorRigidBodySpringDamper"
         law = self.symbolic(contact_law(journal_spin), "springForceTorqueUserFunction", item)
-        self.mbs.AddObject(
-            self.items.ObjectConnectorRigidBodySpringDamper(
-                markerNumbers=[journal, bore], springForceTorqueUserFunction=law
-            )
-        )
+        self.add(item, markerNumbers=[journal, bore], springForceTorqueUserFunction=law)
 
     def finish(self, node):
         """Put the gas and the sensors on coordinate 0 of the crosshead's node, and assemble."""
-        ground = self.mbs.AddNode(self.items.NodePointGround())
+        ground = self.add("NodePointGround")
         ends = [
-            self.mbs.AddMarker(self.items.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
-            for n in (ground, node)
+            self.add("MarkerNodeCoordinate", nodeNumber=n, coordinate=0) for n in (ground, node)
         ]
         item = "ObjectConnectorCoordinateSpringDamper"
         law = self.symbolic(gas_law(), "springForceUserFunction", item)
-        gas = self.mbs.AddObject(
-            self.items.ObjectConnectorCoordinateSpringDamper(
-                markerNumbers=ends, springForceUserFunction=law
-            )
-        )
+        gas = self.add(item, markerNumbers=ends, springForceUserFunction=law)
         kinds = self.exu.OutputVariableType
         sensors = tuple(
-            self.mbs.AddSensor(
-                self.items.SensorNode(nodeNumber=node, storeInternal=True, outputVariableType=kind)
-            )
+            self.add("SensorNode", nodeNumber=node, storeInternal=True, outputVariableType=kind)
             for kind in (kinds.Coordinates_t, kinds.Coordinates_tt)
         )
         self.mbs.Assemble()
