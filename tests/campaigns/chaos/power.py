@@ -33,6 +33,7 @@ NO_FLUSH = struct.pack("I", 2)  # FS_SHUTDOWN_FLAGS_NOLOGFLUSH
 IMAGE_BYTES = 24 << 20
 OPTIONS = ("commit=1", "commit=5", "commit=1,data=writeback", "commit=1,nodelalloc")
 CONTROL_EVERY = 5  # trials: the power is cut once more, without fsync
+LONG = 600.0  # s, of a whole sweep on a busy machine
 MAX_SECONDS = 1.5  # from the first acknowledged job to the cut
 JOBS = {"metrics": 1000, "series": 21}
 
@@ -82,7 +83,7 @@ def arranged(folder):
     ]
     studies = load_studies(*files)
     common.SWEEP.run_job(studies[0].cases[0])
-    return studies, common.forked(lambda: swept(studies, folder / "whole"), 600).result
+    return studies, common.forked(lambda: swept(studies, folder / "whole"), LONG).result
 
 
 def swept(studies, store):
@@ -148,7 +149,7 @@ def cut_once(place, draw, is_synced=True):
     with common.mounted(place / "copy", "-o", "loop", place / "cut.img") as disk:
         ended = common.forked(lambda: acknowledged - intact(disk / "store"))
         lost = acknowledged if ended.death else ended.result
-        again = common.forked(lambda: swept(studies, disk / "store"))
+        again = common.forked(lambda: swept(studies, disk / "store"), LONG)
         return acknowledged, lost, again.death or common.differing(again.result, expected)
 
 
