@@ -4,7 +4,7 @@ Beyond the time at which two motions that start close to each other part, the ho
 the course of a motion has an error bar. Two runs are compared, one with its journals shifted, each
 with steps of its own, at a tolerance of their own: their errors must be small beside the shift that
 is followed. At 3e-13 the horizons of 14 of 16 clearances were those at 1e-13 to a hundredth, at
-1e-12 only of seven (tests/solve/test_search.py).
+1e-12 only of seven (tests/solve/test_regime.py).
 
 Where a case leaves to the program from which revolution on metrics count, a run is followed until
 those of several revolutions in a row agree within what accuracy promises, a period apart.

@@ -30,7 +30,7 @@ PURE = ("kinematics", "contact", "loads", "cam", "tally", "onset", "step_control
         "general_mechanism")  # fmt: skip
 COMPILED = ("invariances", "march", "integrate", "steppers", "simulate", "accuracy",
             "regime")  # fmt: skip
-LAWS = ("contact_laws", "friction_laws", "chosen_laws")
+LAWS = ("contact_laws", "friction_laws")
 TESTED_IN = {
     "mechanism": ("general_mechanism", "steppers"),
     "mechanism_rows": ("general_mechanism", "feature_runs"),

@@ -320,16 +320,6 @@ def _ideal_motion(t, params):
     return _ideal_functions("math")[0](t, *_machine(_record(params, "math")))
 
 
-def ideal_joint_forces(t, phase, params):
-    """{joint: (fx, fy)} [N] on the rod in the mechanism without clearance; mpf of 40 digits."""
-    with mpmath.workdps(DIGITS):
-        p, t = _record(params, "mpmath"), mpmath.mpf(t)
-        motion, joint_forces = _ideal_functions("mpmath")
-        x, v, *_ = motion(t, *_machine(p))
-        forces = joint_forces(t, *_machine(p), piston_force(x, v, x, v, phase, p))
-        return {"big_end": tuple(forces[:2]), "small_end": tuple(forces[2:])}
-
-
 def _evaluate(scene, q, qd, t, phase, params, backend):
     """Accelerations, the actions on the bodies and the forces on the rod in one state."""
     p, y = _record(params, backend), _numbers([*q, *qd], backend)

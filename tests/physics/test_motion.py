@@ -142,20 +142,6 @@ def check_forces(scene, t, y, phase, p, absolute_state, params):
     return bool((row[Column.NORMAL : Column.NORMAL + 2] > 0).any())
 
 
-@pytest.mark.parametrize("load", LOADS)
-def test_ideal_joint_forces_agree_with_newton_and_euler(load):
-    machine = {"gravity_m_per_s2": 9.81, "rod_centre_mm": 220}
-    p = record(Case.from_values({"load": load, "machine": machine}))
-    params = reference.paper_params(load, "none", 0.0, gravity=9.81, rod_centre=0.22,
-                                    rod_inertia=float(p.rod_inertia))  # fmt: skip
-    row = np.empty(COLUMNS)
-    for k, t in enumerate(np.linspace(0.001, 0.119, 24)):
-        observe_at(t, np.zeros(4), k % 4, p, row)
-        forces = reference.ideal_joint_forces(t, k % 4, params)
-        expected = [float(f) for joint in reference.JOINTS for f in forces[joint]]
-        assert row[Column.FORCE : Column.FORCE + 4] == pytest.approx(expected, rel=1e-11, abs=1e-8)
-
-
 def test_a_nanometre_of_clearance_keeps_its_digits():
     """The force of a contact and the rates, against positions of metres with 40 digits."""
     case = Case.from_values({"joint": "big_end", "clearance_mm": 1e-6})

@@ -12,10 +12,8 @@ from compressor.physics.tally import (
     FIELDS,
     IN_STEPS,
     add_flows,
-    cut_tally,
     extreme_of,
     lobatto,
-    merge_tallies,
     new_tally,
     peak_of,
     tally_energy,
@@ -41,24 +39,20 @@ def test_a_straight_line_has_no_extreme():
 
 
 @pytest.mark.parametrize("middle", [0.1, 0.37, 0.5, 0.93])
-def test_peak_between_nodes_is_found(middle):
+@pytest.mark.parametrize(
+    ("column", "bend", "top", "least", "before"),
+    [(ACCELERATION, 3.0, 7.0, 0.0, 6.9),
+     # a gap at both ends, larger than the depth; and one that stays
+     (PENETRATION, -2e-4, 1e-5, -np.inf, 9.9e-6), (PENETRATION, -2e-4, 1e-5 - 1, -np.inf, -np.inf)],
+)  # fmt: skip
+def test_a_top_between_nodes_is_found(column, bend, top, least, before, middle):
+    """Of the size of an acceleration, which may be negative, and of a depth as it is."""
     rows = np.zeros((NODES.size, COLUMNS))
-    rows[:, ACCELERATION] = -7.0 + 3 * (NODES - middle) ** 2
-    assert peak_of(NODES, rows, 1, ACCELERATION, 0.0) == pytest.approx(7.0, rel=1e-12)
-    assert peak_of(NODES, rows, 1, ACCELERATION, 6.9) == pytest.approx(7.0, rel=1e-12)
-    assert peak_of(NODES, rows, 1, ACCELERATION, 50.0) == 50.0
-
-
-@pytest.mark.parametrize("middle", [0.1, 0.37, 0.5, 0.93])
-def test_depth_between_nodes_is_found(middle):
-    rows = np.zeros((NODES.size, COLUMNS))
-    rows[:, PENETRATION] = (
-        1e-5 - 2e-4 * (NODES - middle) ** 2
-    )  # a gap at both ends, larger than the depth
-    assert peak_of(NODES, rows, 1, PENETRATION, -np.inf) == pytest.approx(1e-5, rel=1e-12)
-    assert peak_of(NODES, rows, 1, PENETRATION, 9.9e-6) == pytest.approx(1e-5, rel=1e-12)
-    assert peak_of(NODES, rows, 1, PENETRATION, 5e-5) == 5e-5
-    assert peak_of(NODES, rows - 1.0, 1, PENETRATION, -np.inf) == pytest.approx(1e-5 - 1, rel=1e-12)
+    sign = -1.0 if column == ACCELERATION else 1.0
+    rows[:, column] = sign * top + bend * (NODES - middle) ** 2
+    assert peak_of(NODES, rows, 1, column, least) == pytest.approx(top, rel=1e-12)
+    assert peak_of(NODES, rows, 1, column, before) == pytest.approx(top, rel=1e-12)
+    assert peak_of(NODES, rows, 1, column, 50.0) == 50.0
 
 
 def steady_rows(count):
@@ -134,20 +128,6 @@ def test_the_nodes_of_a_step_have_what_is_tallied_and_no_more(features):
     tally_step(1e-4, *nodes, rows, 1, APART, SIDES, True, tally, p)
     for field in FIELDS:
         assert np.isfinite(tally[field.name]).all(), field.name
-
-
-def test_parts_of_a_run_are_merged_as_their_fields_say():
-    whole = new_tally(True)
-    for field in FIELDS:
-        whole[field.name] = 3
-    before = cut_tally(whole)
-    for field in FIELDS:
-        assert (before[field.name] == 3).all()
-        assert (whole[field.name] == (3 if field.merge == "kept" else field.begin)).all()
-        whole[field.name] = 2
-    for field in FIELDS:
-        merged = merge_tallies([before, whole])[field.name]
-        assert (merged == {"sum": 5, "peak": 3, "kept": 2}[field.merge]).all(), field.name
 
 
 def test_energy_ledger_of_a_known_step():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from conftest import CHAOTIC
 
+from compressor.analysis.shaking import healthy_twin
 from compressor.cases.case import Case
 from compressor.metrics import of_source
 from compressor.solve import body
@@ -134,3 +135,51 @@ def test_a_chaotic_motion_has_intervals_of_its_averages():
     assert float(run["sensor_rms_error"]) == pytest.approx(error / (2 * rms), rel=1e-3)
     bar = float(run["sensor_counts_per_rev_error"].sel(threshold="first"))
     assert 0 < bar < 0.5 * float(run["sensor_counts_per_rev"].sel(threshold="first"))
+
+
+FINE = {"duration_rev": 2, "settle_rev": 1, "output_step_deg": 0.3}
+LOOSE = {"joint": "big_end", "clearance_mm": 0.2, "solve": FINE}
+RECORDED = {"sensor_time", "sensor_acceleration", "tacho_time"}
+
+
+def run(**values):
+    return simulate(Case.from_values({**LOOSE, **values}))
+
+
+@pytest.mark.parametrize("duration", ["auto", 6])
+def test_a_steady_body_repeats_the_revolutions_that_auto_finds(duration):
+    """What the same revolutions by number give, but for rounding of times."""
+    more = {"body": True, "sensor": {"noise_m_per_s2": 0}}
+    found = run(**more, solve={**FINE, "settle_rev": "auto", "duration_rev": duration})
+    settled = float(found["settled_rev"])
+    turns = round(float(found["time"][-1]) * 500 / 60)
+    assert turns == (settled + 3 if duration == "auto" else duration)
+    same = run(**more, solve={**FINE, "settle_rev": settled, "duration_rev": turns})
+    for name in (*body.BODY, *RECORDED):
+        size = np.nanmax(np.abs(same[name].values))
+        np.testing.assert_allclose(found[name].values, same[name].values, rtol=0, atol=1e-8 * size)
+    assert len(found["tacho_time"]) == turns - settled
+
+
+def test_a_run_that_stops_has_a_body_of_nan():
+    found = run(body=True, sensor=True, solve={**FINE, "max_steps": 50})
+    assert np.isnan(found["body_displacement"].values).all()
+    assert "sensor_acceleration" not in found
+
+
+def test_the_default_foundation_holds_the_healthy_machine_by_hand():
+    """Orders 1 and 2 of X, 6152.1 and 1086.7 N, and 1 of Y, 773.2 N, on 500 kg at 60 Hz."""
+    case = Case.from_values({"body": True, "solve": FINE})
+
+    def speed(order, force):
+        w, natural = order * case.omega, 2 * math.pi * 60.0
+        return force / 500.0 * w / abs(natural**2 - w**2 + 2j * 0.03 * natural * w)
+
+    along = math.hypot(speed(1, 6152.1), speed(2, 1086.7)) / math.sqrt(2)
+    expected = [along, speed(1, 773.2) / math.sqrt(2)]
+    assert expected == pytest.approx([3.49e-3, 0.41e-3], rel=0.01)  # what pages say
+    run = simulate(case)
+    assert healthy_twin(run)["body_velocity_rms"].values == pytest.approx(expected, rel=1e-3)
+    assert np.isnan(run["body_displacement"].values[:1200]).all()
+    velocity = run["body_velocity"].values[1200:2400]  # of the settled revolution
+    assert np.sqrt((velocity**2).mean(axis=0)) == pytest.approx(expected, rel=1e-3)

@@ -1,22 +1,15 @@
-"""Runs of a double-acting cylinder: integrators agree, corners are landed on, features work."""
+"""Runs of a double-acting cylinder: corners are landed on, forces have no steps, cards press."""
 
 import numpy as np
 import pytest
 from cylinder_made import DOUBLE, MACHINE, pressures
 from test_feature_runs import apart
 
-from compressor.analysis.cylinder import end_states
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 
 HEAVY = MACHINE | {"reciprocating_mass_kg": 30}
 WORN = {"joint": "small_end", "clearance_mm": 0.2}
-FEATURES = {
-    "guide": {"guide": {"clearance_mm": 0.1}},
-    "drive": {"drive": {"flywheel_kg_m2": 20, "torque_N_m": 600}},
-    "oil": {"lubricant": True},
-    "law": {"contact": {"law": "flores", "restitution": 0.7}},
-}
 
 
 def run(more, **solve):
@@ -27,28 +20,6 @@ def run(more, **solve):
     return found
 
 
-@pytest.mark.parametrize("method", ["RODAS", "DOP853"])
-def test_another_integrator_finds_the_same(method):
-    """The equations alone are shared; the forces of both faces among them.
-
-    At nearly all times: SciPy's DOP853 now and then lays an interpolant that swings between two
-    nodes which are right (2 samples of 1,201, 3 % off, in one of 60 runs; it depends on the BLAS).
-    """
-    ours, theirs = run({}, rtol=1e-9), run({}, rtol=1e-8, method=method)
-    for name in ("acceleration", "contact_force", "piston_force"):
-        a, b = ours[name].values, theirs[name].values
-        assert np.quantile(abs(a - b), 0.99) < 1e-5 * abs(a).max(), name
-    for one in (ours, theirs):
-        assert float(one.energy_residual) < 1e-5
-
-
-@pytest.mark.parametrize("joint", ["big_end", "both"])
-def test_the_promise_is_kept(joint):
-    exact = run({"joint": joint}, rtol=1e-11)
-    assert apart(exact, run({"joint": joint}, accuracy="standard")) < 5e-3
-    assert apart(exact, run({"joint": joint}, accuracy="fine")) < 1e-4
-
-
 def test_errors_fall_with_the_tolerance():
     """A corner that a step passes over would leave an error that the tolerance does not lower."""
     exact = run({}, rtol=1e-12)
@@ -56,14 +27,6 @@ def test_errors_fall_with_the_tolerance():
     assert errors[0] > errors[1] > errors[2]
     assert errors[0] > 100 * errors[2]  # of 10,000: one error is by chance a few times another
     assert errors[2] < 1e-6
-
-
-@pytest.mark.parametrize("name", FEATURES)
-def test_a_feature_works_with_it(name):
-    """By explicit steps and by stiff ones; energy closes."""
-    runs = [run(FEATURES[name], rtol=1e-8, method=one) for one in ("TSIT5", "RODAS")]
-    assert apart(*runs) < 2e-4
-    assert all(float(one.energy_residual) < 1e-5 for one in runs)
 
 
 ENDS = {
@@ -92,11 +55,6 @@ def test_the_force_of_a_worn_machine_has_kinks_and_no_steps(ends, oil):
     allowed = steepest[1:] * np.abs(np.diff(x)) + 1e-6
     assert (np.abs(np.diff(force)) <= 1.05 * allowed).all()
     assert force.max() - force.min() > 1e4
-    states = end_states(found)
-    faces = {"head": np.pi * 0.11**2, "crank": -np.pi * (0.11**2 - 0.03**2)}
-    pressing = sum(1e6 * states[end].pressure * faces[end] for end in states)
-    pressing -= 1e5 * sum(faces[end] for end in states)
-    assert force == pytest.approx(pressing, abs=1e-9 * np.abs(force).max())
 
 
 CYCLE = ("suction_MPa", "discharge_MPa", "exponent", "clearance_percent", "valve_loss_percent")
@@ -124,20 +82,9 @@ def test_a_card_of_the_ideal_cycle_gives_the_ideal_run_back(tmp_path, step, forc
     assert float(found.energy_residual) < 1e-9
 
 
-def test_a_card_presses_by_the_crank_s_angle(tmp_path):
-    """In a worn machine as in the ideal one, whatever the piston does; integrators agree."""
-    ours = {"gas": cards(tmp_path, 1)}
-    ideal = run(ours | {"joint": "none", "clearance_mm": {}}, rtol=1e-9)
-    worn = [run(ours, rtol=1e-9, method=one) for one in ("TSIT5", "RODAS")]
-    assert apart(ideal, worn[0], "piston_force") < 1e-12
-    for other in worn[1:]:
-        assert apart(worn[0], other) < 2e-4
-    assert all(float(one.energy_residual) < 1e-5 for one in worn)
-
-
 def test_a_card_works_with_a_drive(tmp_path):
     """Whose crank goes on at a speed of its own: the card follows its angle."""
-    ours = {"gas": cards(tmp_path, 1), "drive": FEATURES["drive"]["drive"]}
+    ours = {"gas": cards(tmp_path, 1), "drive": {"flywheel_kg_m2": 20, "torque_N_m": 600}}
     found = run(ours, rtol=1e-9, duration_rev=2)
     node = np.array([0, 300, 700, 1000])
     degrees = np.degrees(found.crank_angle.values[node]) % 360

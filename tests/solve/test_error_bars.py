@@ -1,16 +1,16 @@
 """Error bars: what they cover, what they say when they cannot, and accuracy as it is asked for."""
 
+import itertools
+
 import numpy as np
 import pytest
 from random_cases import random_cases
 
 from compressor.cases.case import Case
-from compressor.metrics import METRICS, NUMBERS, SERIES
-from compressor.physics import COLUMNS, Column
+from compressor.metrics import METRICS, SERIES
 from compressor.solve import error_bars
 from compressor.solve import run as run_module
 from compressor.solve.error_bars import FLOOR, bars
-from compressor.solve.series import distances
 from compressor.solve.simulate import measure, simulate
 from compressor.solve.solution import solve
 
@@ -40,23 +40,6 @@ def within(found, truth, stretch=1.0):
 
 
 # ---- from two runs to bars
-
-
-def test_distances_are_relative_and_by_joint():
-    ours, theirs = np.zeros((4, COLUMNS)), np.zeros((4, COLUMNS))
-    ours[:, Column.ACCELERATION] = [3, 0, 4, 0]
-    theirs[:, Column.ACCELERATION] = [3, 0, 4, 0.5]
-    ours[:, Column.FORCE + 2] = [0, 2, 0, 0]  # of the small end, along x
-    theirs[:, Column.FORCE + 2] = [0, 2, 0.3, 0]
-    theirs[:, Column.FORCE + 3] = [0, 0.4, 0, 0]  # and y
-    found = distances(ours, theirs)
-    assert found.keys() == SERIES.keys()
-    assert found["acceleration"] == pytest.approx(0.1)
-    assert found["contact_force"].tolist() == pytest.approx([0.0, 0.25])
-    assert found["velocity"] == 0.0
-    for name, value in found.items():
-        joint = (2,) if "joint" in NUMBERS[f"{name}_error"].dims else ()
-        assert np.shape(value) == joint, name
 
 
 def test_runs_that_agree_by_chance_have_bars_by_their_series():
@@ -205,3 +188,34 @@ def test_bars_of_the_ideal_machine_cover_its_quadrature(load):
         slack = rounding if name.startswith("mean_") else 0.0
         assert (error <= found.numbers[f"{name}_error"] + slack).all(), name
     assert found.numbers["peak_acceleration_error"] < 1e-5 * found.numbers["peak_acceleration"]
+
+
+@pytest.mark.compiled
+def test_error_bars_hold_with_laws():
+    """Of the default promise, by far tighter runs. With six restitutions each, 95 % of 500 do.
+
+    One of the twelve may say that it is chaotic: its runs at 2.5e-12 and 1e-12 differ by 1 %.
+    """
+    shares, chaotic = [], 0
+    laws = "gonthier", "flores", "lankarani_nikravesh", "hu_guo"
+    for law, restitution in itertools.product(laws, (0.3, 0.5, 0.6)):
+        contact = {"law": law, "restitution": restitution}
+        values = {"joint": "both", "clearance_mm": 0.2, "contact": contact}
+        run, exact = (
+            simulate(Case.resolve({**values, "solve": solve}))
+            for solve in ({}, {"rtol": 1e-10, "error_bars": False})
+        )
+        if run.attrs["regime"] == "chaotic":
+            chaotic += 1
+            continue
+        assert run.attrs["promise"] == "kept"
+        a, b = run["acceleration"].values, exact["acceleration"].values
+        assert np.linalg.norm(a - b) < 0.005 * np.linalg.norm(b)
+        for name in METRICS:
+            if f"{name}_error" in run and name in exact:
+                away, bar = abs(run[name] - exact[name]).values, run[f"{name}_error"].values
+                known = np.isfinite(bar) & np.isfinite(away)
+                shares += (away[known] / np.maximum(bar[known], 1e-300)).tolist()
+    assert chaotic <= 1
+    assert len(shares) > 225
+    assert np.mean(np.array(shares) <= 1.0) > 0.85

@@ -70,18 +70,6 @@ def test_it_is_the_masses_times_the_second_derivative_of_the_eccentricity(values
         assert knock == pytest.approx(expected, rel=0.01)
 
 
-def test_it_is_known_within_its_bar_by_another_method_and_0_without_clearance():
-    values = {"joint": "small_end", "clearance_mm": 0.2}
-    solve_by = {"duration_rev": 1, "settle_rev": 0.5}
-    ours = simulate(Case.from_values(values | {"solve": solve_by}))
-    theirs = simulate(Case.from_values(values | {"solve": solve_by | {"method": "DOP853"}}))
-    bars = ours.knock_error + theirs.knock_error
-    assert (abs(ours.knock - theirs.knock) <= bars).all()
-    assert 0.0 < bars.sel(joint="small_end") < 0.01 * ours.knock.sel(joint="small_end")
-    assert not ours.knock.sel(joint="big_end")
-    assert not simulate(Case.from_values({})).knock.any()
-
-
 @pytest.mark.parametrize(
     ("clearance", "length", "viscosity", "knocks"),
     [(0.05, 100, 48, False), (0.2, 100, 48, False), (0.1, 50, 24, False),

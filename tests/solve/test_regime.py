@@ -19,6 +19,8 @@ from compressor.solve.search import (
     LOOK_RTOL,
     LOOK_SHIFT,
     MIN_WORK,
+    PARTED_DISTANCE,
+    SHIFT,
     SURE_FACTOR,
     Parting,
     Search,
@@ -26,7 +28,7 @@ from compressor.solve.search import (
     repeats,
 )
 from compressor.solve.series import compared_per_rev, compared_times
-from compressor.solve.simulate import measure
+from compressor.solve.simulate import measure, simulate
 
 PAPER = {"joint": "big_end", "clearance_mm": 0.2}
 NO_ERRORS = dict.fromkeys(SERIES, 0.0)
@@ -178,18 +180,6 @@ def test_a_case_that_needs_more_than_its_budget_is_refused_in_these_words(monkey
     assert again.attributes["regime"] == found.attributes["regime"]
 
 
-def test_a_search_ends_with_the_job_s_time(monkeypatch):
-    """The clock counts for timeout_s alone."""
-    now = [0.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    search = searched(case(CHAOTIC, timeout_s=3.0), 600_000)
-    now[0] += 2.5
-    assert search.left == pytest.approx(0.5)
-    now[0] += 0.5
-    assert not search.parts(whole=True)
-    assert search.stopped
-
-
 def test_what_cannot_be_told_in_the_time_is_undecided(monkeypatch):
     monkeypatch.setattr(Search, "parts", lambda self, whole: False)
     found = measure(case(CHAOTIC, rtol=1e-6))
@@ -232,3 +222,51 @@ def test_less_than_two_revolutions_tell_no_period(duration, settle):
     whole = replace(of, solve=replace(of.solve, duration_rev=settle + 2.0))
     assert compared_per_rev(whole)
     assert repeats(whole, samples(whole, np.ones_like), NO_ERRORS) == (1, settle)
+
+
+# ---- how long a motion can be foretold: what parts two runs is the motion, not their steps
+
+REGULAR = {"joint": "both", "clearance_mm": 0.3}
+QUICK = {"duration_rev": 1.2, "settle_rev": 0}
+BRIEF = {"duration_rev": 1.2, "settle_rev": 0.2, "output_step_deg": 0.9}
+
+
+def test_a_horizon_is_that_of_tighter_runs_on_a_finer_grid():
+    """Its own runs' errors are far below the shift, and it looks often enough."""
+    made, pair = case(CHAOTIC, **QUICK), []
+    for shift in (0.0, SHIFT * 0.3 / math.sqrt(2)):  # mm
+        solve = {**QUICK, "rtol": 1e-12, "output_step_deg": 0.02, "error_bars": False}
+        offset = {"big_end_x": shift, "big_end_y": shift}
+        values = {**CHAOTIC, "initial_offset_mm": offset, "solve": solve}
+        pair.append(simulate(Case.from_values(values))["eccentricity"].sel(joint="big_end"))
+    apart = np.hypot(*(pair[1] - pair[0]).values.T) / 0.3e-3
+    parted = float(pair[0]["time"][np.flatnonzero(apart > PARTED_DISTANCE)[0]])
+    horizon = predictability_horizon(made)
+    assert 0.9 * made.turn < horizon < made.duration
+    assert horizon == pytest.approx(parted, rel=0.01)
+    assert predictability_horizon(made, rtol=1e-13) == pytest.approx(horizon, rel=0.01)
+
+
+def test_the_case_s_own_solver_does_not_count():
+    ours = predictability_horizon(case(CHAOTIC, **QUICK))
+    assert predictability_horizon(case(CHAOTIC, **QUICK, method="RODAS", rtol=1e-3)) == ours
+
+
+def test_a_run_that_stops_before_they_part_tells_of_no_horizon():
+    """It was the time of the stop, and the motion was called chaotic."""
+    assert math.isnan(predictability_horizon(case(REGULAR, **QUICK, max_steps=100)))
+    assert math.isnan(predictability_horizon(case(REGULAR, **QUICK), timeout=0.0))
+    found = measure(
+        case(REGULAR, **QUICK, horizon=True, max_steps=10_000)
+    )  # enough for all but those runs
+    assert (found.status, found.attributes["regime"]) == ("ok", "predictable")
+    assert math.isnan(found.numbers["predictability_horizon"])
+
+
+def test_a_motion_that_can_be_foretold_keeps_its_bars():
+    plain, asked = (
+        measure(case(REGULAR, **BRIEF, horizon=asked)).numbers for asked in (False, True)
+    )
+    assert asked["predictability_horizon"] == math.inf
+    for name in (*METRICS, *(f"{one}_error" for one in METRICS)):
+        assert np.array_equal(asked[name], plain[name]), name

@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 from compsim.job_text import reversal_verdict, values_of
 from conftest import store_cases
-from cylinder_made import DOUBLE, pressures
-from test_cylinder_runs import HEAVY
 
 from compressor.cases.case import Case
 from compressor.metrics import NUMBERS
-from compressor.physics import exact_motion
 from compressor.solve.simulate import measure, simulate
 
 NAMES = (
@@ -66,25 +63,6 @@ def test_a_peak_is_of_the_side_that_it_is_on():
         assert float(run[f"{name}_error"]) < 1e-3 * top
 
 
-@pytest.mark.parametrize("joint", ["none", "small_end"])
-def test_of_a_machine_turned_round(joint):
-    """With a rod of 100 m the head's end alone and the crank's end alone are one machine."""
-    gas = {"bore_mm": 220, "suction_MPa": 0.2, "discharge_MPa": 0.55, "back_pressure_MPa": 0.1}
-    ends = (
-        {"clearance_percent": 14, "switching": "exact"},
-        {"action": "crank_end", "clearance_percent": {"crank": 14}, "rod_diameter_mm": 1e-6},
-    )
-    machine = {"stroke_mm": 180, "rod_length_mm": 100_000, "rod_inertia_kg_m2": 1000,
-               "speed_rpm": 571, "reciprocating_mass_kg": 24}  # fmt: skip
-    solve = TURN | {"duration_rev": 4, "settle_rev": 3}
-    values = {"load": "gas", "machine": machine, "solve": solve, **SIGNALLED}
-    if joint != "none":
-        values |= {"joint": joint, "clearance_mm": 0.3, "contact": FLIES["contact"]}
-    head, crank = (measure(Case.from_values({**values, "gas": gas | end})).numbers for end in ends)
-    for one, other in zip(NAMES, (*NAMES[:2], *NAMES[:1:-1]), strict=True):
-        assert head[one] == pytest.approx(crank[other], rel=0.02), one
-
-
 @pytest.mark.parametrize(
     ("load", "degrees", "share"), [("spring", 108.6, 0.49), ("gas", 117.3, 0.73)]
 )
@@ -95,26 +73,6 @@ def test_of_the_ideal_machine(load, degrees, share):
     if load == "spring":
         peaks = [numbers[f"peak_rod_load_{side}"] for side in ("tension", "compression")]
         assert sorted(peaks) == pytest.approx([2330, 4725], abs=1.0)
-
-
-def test_of_a_double_acting_cylinder():
-    """Combined rod load of the ideal machine: gas on both faces, less the ideal m a."""
-    gas = DOUBLE | {"valve_loss_percent": 0, "back_pressure_MPa": 0}
-    values = {"load": "gas", "machine": HEAVY, "gas": gas, "solve": TURN, **SIGNALLED}
-    numbers = measure(Case.from_values(values)).numbers
-    degrees = np.arange(0, 360, 0.05) + 0.025
-    head, crank = pressures(degrees, 0.2, 0.7)
-    push = 1e6 * math.pi * (0.11**2 * head - (0.11**2 - 0.03**2) * crank)
-    _, _, a = exact_motion(np.radians(degrees), 0.09, 0.45, 740 * math.pi / 30)
-    load = -push - 30 * a  # positive in tension
-    pull, push = load.max(), -load.min()
-    tension = 360 * np.mean(load > 0)
-    assert numbers["peak_rod_load_tension"] == pytest.approx(pull, rel=2e-3)
-    assert numbers["peak_rod_load_compression"] == pytest.approx(push, rel=2e-3)
-    share = min(pull, push) / max(pull, push)
-    assert numbers["rod_load_reversal_share"] == pytest.approx(share, rel=4e-3)
-    angle = math.degrees(numbers["rod_load_reversal_angle"])
-    assert angle == pytest.approx(min(tension, 360 - tension), abs=0.2)
 
 
 CYLINDER = {"action": "double", "rod_diameter_mm": 30, "clearance_percent": 9}

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from compressor.metrics import METRICS, NUMBERS, QUANTILES
+from compressor.metrics import QUANTILES
 from compressor.physics import merge_tallies, new_record, new_tally
 from compressor.solve.run_metrics import (
-    MAX_BATCHES,
     MIN_REVOLUTIONS,
     chaotic_bars,
     count_bar,
     metrics,
-    parts,
     statistics,
     summarize_peaks,
 )
@@ -84,28 +82,6 @@ def test_quantiles_are_those_of_the_draw():
     np.testing.assert_allclose(np.mean([row["x_mean"] for row in rows], axis=0), 1.0, rtol=0.01)
 
 
-def test_a_single_revolution_tells_no_error(record):
-    each = turns(np.random.default_rng(4), 1)
-    found = statistics(record, each)
-    assert {*found} == {name for name, row in NUMBERS.items() if row.source == "statistics"}
-    for name, value in found.items():
-        if name.endswith("error") or name == "revolutions_to_one_percent":
-            assert np.isposinf(value).all(), name
-    bars = chaotic_bars(record, each, metrics(record, merge_tallies(each)))
-    assert bars.keys() == METRICS.keys()
-    assert all(np.isposinf(bar).all() for bar in bars.values())
-
-
-def test_greatest_values_have_no_bar_but_an_ideal_joint_has_none_to_err_in(record):
-    record["clearance"][1] = 0.0
-    each = turns(np.random.default_rng(5), 40)
-    numbers = metrics(record, merge_tallies(each))
-    bars = chaotic_bars(record, each, numbers)
-    assert np.isposinf(bars["peak_acceleration"])
-    assert bars["max_penetration"].tolist() == [math.inf, 0.0]
-    assert 0 < bars["rms_acceleration"] < 1
-
-
 def test_batches_that_agree_by_chance_say_nothing(record):
     """Two revolutions alike had a bar of 0; a count has a Poisson one at least."""
 
@@ -131,13 +107,3 @@ def test_the_least_bar_of_a_count_is_that_of_a_poisson_one():
     for count in (0, 1, 5, 24, 1000):
         upper = poisson_upper(count)
         assert count_bar(np.array(count)) == pytest.approx(upper - count, rel=0.1, abs=0.2)
-
-
-@pytest.mark.parametrize("count", [1, 2, 29, 30, 31, 59, 60, 100, 1000])
-def test_batches_are_alike_and_few(count):
-    batches = parts(range(count), MAX_BATCHES, 1)
-    assert len({len(batch) for batch in batches}) == 1
-    assert len(batches) <= MAX_BATCHES
-    assert batches[-1][-1] == count - 1  # what is left out is the beginning
-    assert sum(map(len, batches)) > count / 2
-    assert all(len(s) >= min(count, 5) for s in parts(range(count), 30, 5))

@@ -1,10 +1,67 @@
-"""The body on its foundation: closed forms, and a machine that is coupled both ways."""
+"""Oscillators and the body on its foundation against closed forms."""
 
 import numpy as np
 import pytest
 
 from compressor.cases.optional_groups import Body
-from compressor.vibration.body import Forces, body_motion, casing_motion, point_acceleration
+from compressor.vibration.body import (
+    Forces,
+    body_motion,
+    casing_motion,
+    oscillate,
+    point_acceleration,
+)
+
+FREQUENCY, DAMPING = 20.0, 0.03
+OMEGA = 2 * np.pi * FREQUENCY
+DAMPED = OMEGA * np.sqrt(1 - DAMPING**2)
+
+
+def free(times, displacement, velocity):
+    """The free motion from a displacement and a velocity."""
+    swing = (velocity + DAMPING * OMEGA * displacement) / DAMPED * np.sin(DAMPED * times)
+    return np.exp(-DAMPING * OMEGA * times) * (displacement * np.cos(DAMPED * times) + swing)
+
+
+def close(found, expected):
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+
+
+def test_a_steady_sine():
+    """A machine's 25 Hz over 1 kHz of casing, at the samples of a sensor."""
+    times = np.linspace(0, 0.04, 4097)
+    v = 2 * np.pi * 25.0
+    for frequency in (20.0, 1000.0):
+        omega = 2 * np.pi * frequency
+        found = oscillate(np.cos(v * times), times[1], frequency, DAMPING, steady=True)
+        gain = 1 / (omega**2 - v**2 + 2j * DAMPING * omega * v)
+        whole = gain * np.exp(1j * v * times)
+        close(found.displacement, whole.real)
+        close(found.velocity, (1j * v * whole).real)
+        close(found.acceleration, (-(v**2) * whole).real)
+
+
+@pytest.mark.parametrize("step", [1e-6, 1e-3, 0.1, 3.0])
+def test_a_cubic_is_exact_at_any_step(step):
+    """The particular solution of a cubic force is a cubic; its free part is known."""
+    times = step * np.arange(40)
+    cubic = np.array([0.7, -0.2, 0.3, 1.1])  # of the displacement, in powers of t / (4 s)
+    powers = (times[:, None] / 4.0) ** np.arange(4)
+    shape = powers @ cubic
+    slope = powers[:, :3] @ (cubic[1:] * [1, 2, 3]) / 4.0
+    bend = powers[:, :2] @ (cubic[2:] * [2, 6]) / 16.0
+    force = bend + 2 * DAMPING * OMEGA * slope + OMEGA**2 * shape
+    found = oscillate(force, step, FREQUENCY, DAMPING)
+    expected = shape + free(times, -shape[0], -slope[0])
+    np.testing.assert_allclose(found.displacement, expected, atol=1e-9 * np.abs(shape).max())
+
+
+def test_what_no_oscillator_takes():
+    with pytest.raises(ValueError, match="between 0 and 1, not at 1"):
+        oscillate(np.ones(9), 4e-5, FREQUENCY, 1.0)
+
+
+# ---- the body
 
 STEP, COUNT = 1e-4, 4001
 TIMES = STEP * np.arange(COUNT)
@@ -76,13 +133,3 @@ def test_a_casing_mode_answers_the_force_at_its_place():
     for force, height in ((given.guide[:, 1], 2.0), (given.bearing[:, 0], 3.0)):
         found = casing_motion(body, force, STEP).acceleration
         np.testing.assert_allclose(found, height * shape, atol=1e-9)
-
-
-@pytest.mark.parametrize("frequency", [3.0, 20.0, 33.0])
-def test_a_steady_body_repeats_itself(frequency):
-    body = Body(frequency_x_Hz=frequency)
-    turns = TIMES / TIMES[-1]
-    shape = 800 * np.sin(2 * np.pi * turns) + 90 * np.cos(14 * np.pi * turns)
-    once = body_motion(body, forces(shape), steady=True)["x"]
-    np.testing.assert_allclose(once.displacement[-1], once.displacement[0], rtol=1e-9)
-    np.testing.assert_allclose(once.velocity[-1], once.velocity[0], rtol=1e-9)

@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from compressor.vibration.monitor import count_peaks, segment_levels
 from compressor.vibration.spectra import (
     RecordError,
+    band_signal,
     energy_angle,
     envelope_spectrum,
     high_pass_orders,
@@ -35,19 +37,6 @@ def test_a_line_has_its_own_amplitude(block):
     assert peak.size == rms.size == block // 2 + 1
     assert peak[[0, 30]] == pytest.approx([1.7, 2.5], abs=1e-9)
     assert rms[[0, 30]] == pytest.approx([1.7, 2.5 / np.sqrt(2)], abs=1e-9)
-
-
-def test_the_highest_line_of_an_even_block_is_not_doubled():
-    values = 0.3 * (-1.0) ** np.arange(BLOCK)
-    for rms in (False, True):
-        assert line_amplitudes(values, BLOCK, rms)[-1] == pytest.approx(0.3)
-
-
-def test_white_noise_has_its_level():
-    values = 0.8 * np.random.default_rng(3).standard_normal(400 * BLOCK)
-    squares = line_amplitudes(values, BLOCK, rms=True)[10:-10] ** 2
-    expected = 0.8**2 * 2 / BLOCK
-    assert np.mean(squares) == pytest.approx(expected, rel=0.02)
 
 
 def test_blocks_are_averaged_by_mean_square():
@@ -89,17 +78,6 @@ def test_a_sine_is_restored_from_unequal_angles():
     assert errors[0] / errors[1] == pytest.approx(16, rel=0.25)
 
 
-def test_resampling_gathers_a_line_that_varying_speed_smears():
-    angle = at_varying_speed(20, 40_001)
-    values = 1.5 * np.sin(24 * angle)
-    even_values = resample_angle(angle, values, 2000)
-    found = line_amplitudes(even_values, 2000, rms=False)
-    assert found[24] == pytest.approx(1.5, abs=1e-4)
-    assert np.max(np.delete(found, 24)) < 1e-4
-    smeared = line_amplitudes(values[:-1], values.size // 20, rms=False)
-    assert smeared[24] < 0.5
-
-
 def test_squares_of_the_spectrum_add_up_to_the_mean_square():
     values = 5.0 + noise(8 * M)
     for turns in (8, 1, 4):
@@ -109,59 +87,39 @@ def test_squares_of_the_spectrum_add_up_to_the_mean_square():
 
 # ---- indicators
 
-
-def rms(values):
-    return shape(values)[0]
-
-
-def crest_factor(values):
-    return shape(values)[1]
-
-
-def kurtosis(values):
-    return shape(values)[2]
-
-
-def gini(values):
-    return shape(values)[3]
-
-
 ANGLE = 2 * np.pi * np.arange(4 * M) / M  # four revolutions
 SINE = 2.5 * np.sin(3 * ANGLE)
 SQUARE = np.where(ANGLE % 2.0 < 1.0, 0.7, -0.7)
-BALANCED = np.tile([0.7, -0.7], 100)
-NOISE = np.random.default_rng(11).standard_normal(200_000)
+RAMP = np.arange(1.0, 1001.0)
 SILENCE = np.zeros(100)
 
 
-def test_rms():
-    assert rms(SINE) == pytest.approx(2.5 / math.sqrt(2), rel=1e-12)
-    assert rms(SINE + 4.0) == pytest.approx(math.hypot(4.0, 2.5 / math.sqrt(2)), rel=1e-12)
-    assert rms(SILENCE) == 0.0
+def one_of(size):
+    """A single 1 among zeros, and its shape."""
+    share = 1.0 / size  # a share p of ones has the kurtosis 1 / (p (1 - p)) - 3
+    expected = math.sqrt(share), math.sqrt(size), 1 / (share * (1 - share)) - 3, 1 - share
+    return np.eye(1, size)[0], expected
 
 
-def test_crest_factor():
-    assert crest_factor(SINE) == pytest.approx(math.sqrt(2), rel=1e-12)
-    assert crest_factor(SQUARE) == pytest.approx(1.0, rel=1e-12)
-    assert crest_factor(np.eye(1, 400)[0]) == pytest.approx(20.0, rel=1e-12)
-
-
-def test_kurtosis():
-    assert kurtosis(SINE) == pytest.approx(1.5, rel=1e-12)
-    assert kurtosis(SINE + 9.0) == pytest.approx(1.5, rel=1e-9)
-    assert kurtosis(BALANCED) == pytest.approx(1.0, rel=1e-12)
-    assert kurtosis(NOISE) == pytest.approx(3.0, abs=0.06)  # sqrt(24 / m) = 0.011
-    # a share p of ones has 1 / (p (1 - p)) - 3
-    assert kurtosis(np.eye(1, 50)[0]) == pytest.approx(1 / (0.02 * 0.98) - 3, rel=1e-12)
-
-
-@pytest.mark.parametrize("size", [1, 2, 7, 1000])
-def test_gini(size):
-    assert gini(np.full(size, 0.3)) == pytest.approx(0.0, abs=1e-12)
-    assert gini(np.eye(1, size)[0]) == pytest.approx(1 - 1 / size, abs=1e-12)
-    ramp = np.arange(1.0, size + 1)
-    assert gini(ramp) == pytest.approx((size - 1) / (3 * size), abs=1e-12)
-    assert gini(-5e3 * ramp[::-1]) == pytest.approx((size - 1) / (3 * size), abs=1e-12)
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        (SINE, (2.5 / math.sqrt(2), math.sqrt(2), 1.5, None)),
+        (SINE + 4.0, (math.hypot(4.0, 2.5 / math.sqrt(2)), None, 1.5, None)),
+        (SQUARE, (0.7, 1.0, None, 0.0)),
+        (np.tile([0.7, -0.7], 100), (0.7, 1.0, 1.0, 0.0)),
+        one_of(2),
+        one_of(50),
+        one_of(400),
+        (np.array([0.3]), (0.3, 1.0, None, 0.0)),
+        (RAMP, (None, None, None, 999 / 3000)),
+        (-5e3 * RAMP[::-1], (None, None, None, 999 / 3000)),
+    ],
+)
+def test_rms_crest_factor_kurtosis_and_gini_s_index(values, expected):
+    for found, one in zip(shape(values), expected, strict=True):
+        if one is not None:  # which has a closed form
+            assert found == pytest.approx(one, rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("share", [0.001, 0.5, 0.9, 1.0])
@@ -173,24 +131,15 @@ def test_energy_angle_of_a_burst(share):
     assert energy_angle(SQUARE, share) == pytest.approx(share, rel=1e-9)
 
 
-def test_energy_angle_of_a_sine():
-    """The loudest parts, |x| <= u about the peaks, hold (2u + sin 2u) / pi in an angle 2u / pi."""
-    half = 0.7
-    share = (2 * half + math.sin(2 * half)) / math.pi
-    assert energy_angle(SINE, share) == pytest.approx(2 * half / math.pi, abs=2e-3)
-
-
-@pytest.mark.parametrize("find", [crest_factor, kurtosis, gini, energy_angle])
-def test_silence_has_no_shape(find):
-    assert math.isnan(find(SILENCE))
-
-
-@pytest.mark.parametrize("scale", [1e-6, 1e6])
-@pytest.mark.parametrize("find", [crest_factor, kurtosis, gini, energy_angle])
-def test_shape_knows_no_unit(find, scale):
-    values = NOISE[:500]
-    assert find(scale * values) == pytest.approx(find(values), rel=1e-12)
-    assert rms(scale * values) == pytest.approx(scale * rms(values), rel=1e-12)
+def test_shape_knows_no_unit_and_silence_has_none():
+    values = noise(500)
+    root, *others = shape(values)
+    assert others[1] == pytest.approx(3.0, abs=0.7)  # sqrt(24 / m) = 0.22
+    for scale in (1e-6, 1e6):
+        assert shape(scale * values) == pytest.approx([scale * root, *others], rel=1e-12)
+        assert energy_angle(scale * values) == pytest.approx(energy_angle(values), rel=1e-12)
+    assert shape(SILENCE)[0] == 0.0
+    assert np.isnan([*shape(SILENCE)[1:], energy_angle(SILENCE)]).all()
 
 
 def test_high_pass_removes_orders_up_to_and_with_one():
@@ -234,6 +183,47 @@ def test_lines_of_the_envelope():
     assert np.sum(found > 1e-9) == 2
 
 
+# ---- what a monitoring system reads
+
+
+@pytest.mark.parametrize(
+    ("values", "count"),
+    [
+        ([0, 5, 0], 1),
+        ([0, 5, 6, 4, 0], 1),  # one peak, however long it lasts
+        ([0, 5, 3, 5, 0], 2),  # 3 is not above 3
+        ([0, 5, -5, 0], 1),  # does not come back below in between
+        ([0, 5, 0, -5, 0], 2),  # to either side
+        ([5, 0, 0], 1),  # cut off by the begin
+        ([0, 0, 5], 0),  # by the end
+        ([3, 3, 3], 0),
+    ],
+)
+def test_peaks_over_a_threshold(values, count):
+    assert count_peaks(np.array(values, float), 3.0) == count
+
+
+def test_a_band_holds_its_lines_alone():
+    """rms of lines at 10, 50 and 200 Hz of 3, 4 and 12: that of those inside, ends included."""
+    time = np.arange(4000) / 4000
+    values = sum(a * np.sin(2 * math.pi * f * time + f) for f, a in ((10, 3), (50, 4), (200, 12)))
+    for low, high, square in (
+        (2, 1000, 169),
+        (10, 50, 25),
+        (11, 199, 16),
+        (60, 100, 0),
+        (0, 49, 9),
+    ):
+        found = shape(band_signal(values + 100.0 * (low > 0), 4000.0, low, high))[0]
+        assert found == pytest.approx(math.sqrt(square / 2), abs=1e-9)
+
+
+def test_an_angle_at_a_begin_lies_in_the_segment_that_begins_there():
+    turns = np.arange(72) * 10.0 / 360.0  # of which some are rounded down
+    peak, _ = segment_levels(360.0 * turns, np.arange(72.0))
+    np.testing.assert_array_equal(peak, np.arange(36.0) + 36.0)
+
+
 # ---- what is refused
 
 
@@ -244,8 +234,8 @@ def test_lines_of_the_envelope():
         (lambda: resample_angle(even(2), np.full(2 * M, np.nan), M), "index 0: cut these off"),
         (lambda: resample_angle(even(2), np.ones((2 * M, 2)), M), "pass one real component"),
         (lambda: resample_angle(even(2), 1j * even(2), M), "complex128"),
-        (lambda: rms(np.array([])), "at least one sample"),
-        (lambda: gini(np.array([1.0, np.inf])), "first at index 1"),
+        (lambda: shape(np.array([])), "at least one sample"),
+        (lambda: shape(np.array([1.0, np.inf])), "first at index 1"),
         (lambda: high_pass_orders(SINE, M, M / 2), "choose a lower order"),
         (lambda: high_pass_orders(SINE, M, -1), "choose a lower order"),
         (lambda: high_pass_orders(SINE, M, math.nan), "choose a lower order"),
