@@ -20,6 +20,7 @@ from compressor.sweep.worker import attempt
 
 ROW_BYTES = 700  # of one job in a merged batch without time series
 MAX_CASES = 1_000  # missing jobs that are looked at for what is to be compiled, drawn evenly
+START_SECONDS = 2.0  # of wall time until workers have loaded the equations, on an idle machine
 LONG_JOB = 10.0  # s of a job that is not run twice for what loading was in it
 
 
@@ -119,7 +120,7 @@ def add_times(
         counts,
         studies=tuple(shares),
         workers=working,
-        seconds=sum(share.seconds for share in shares) / min(working, cores()),
+        seconds=START_SECONDS + sum(share.seconds for share in shares) / min(working, cores()),
         compiling=compiling,
         bytes=sum(share.bytes for share in shares),
     )
