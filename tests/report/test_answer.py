@@ -3,25 +3,20 @@
 import numpy as np
 import pytest
 import xarray as xr
+from swept_made import grid
 
 from compressor.report.answer import finding, name_jobs, rank_findings, study_findings, worn_joints
 from compressor.report.figures.sweep_data import MEASURES
 from compressor.report.page import format_measure
 
-PEAK = next(m for m in MEASURES if m.variable == "peak_acceleration")
-FORCE = next(m for m in MEASURES if m.variable == "peak_contact_force")
-LOSS = next(m for m in MEASURES if m.variable == "contact_loss_fraction")
-DEPTH = next(m for m in MEASURES if m.variable == "max_penetration")
-REVERSAL = next(m for m in MEASURES if m.variable == "rod_load_reversal_angle")
-TENSION = next(m for m in MEASURES if m.variable == "peak_rod_load_tension")
+FIRST = {one.variable: one for one in reversed(MEASURES)}  # of joints and axes the first
+PEAK, RMS, FORCE, LOSS, DEPTH, REVERSAL, TENSION, RATE = (FIRST[name] for name in (
+    "peak_acceleration", "rms_acceleration", "peak_contact_force", "contact_loss_fraction",
+    "max_penetration", "rod_load_reversal_angle", "peak_rod_load_tension", "impacts_per_rev",
+))  # fmt: skip
 SMALL_END = [m for m in MEASURES if m.variable == "peak_contact_force"][1]
 KNOCKS = {m.joint: m for m in MEASURES if m.variable == "knock"}
-RATE = next(m for m in MEASURES if m.variable == "impacts_per_rev")
 NAMES = ["a", "b", "c"]
-
-
-def told(measure, values, bars):
-    return finding(measure, np.array(values, float), np.array(bars, float), NAMES)
 
 
 SAME = "nearly the same in all jobs"
@@ -58,46 +53,18 @@ SAME = "nearly the same in all jobs"
     ],
 )  # fmt: skip
 def test_a_change_is_told_by_its_ends(measure, values, bars, expected):
-    found = told(measure, values, bars)
-    assert (
-        found and (found.low, found.at_low, found.high, found.at_high, found.change)
-    ) == expected
+    found = finding(measure, np.array(values, float), np.array(bars, float), NAMES)
+    told = found and (found.low, found.at_low, found.high, found.at_high, found.change)
+    assert told == expected
     if found and found.change.endswith("times"):
         assert found.rank == pytest.approx(np.log(float(found.change.split()[0])), abs=0.01)
 
 
-def test_what_appears_ranks_before_what_grows():
-    rows = [
-        (PEAK, np.array([100.0, 200.0, 300.0]), np.full(3, 0.1)),
-        (LOSS, np.array([0.0, 0.0, 5.0]), np.full(3, 0.01)),
-        (RATE, np.array([0.0, 0.0, 999.0]), np.full(3, 1.0)),
-        (FORCE, np.array([1.0, 2.0, 2.0]), np.full(3, 0.001)),
-    ]
-    found = rank_findings(rows, NAMES)
-    assert [one.title.partition(",")[0] for one in found] == [
-        "Time without dry contact", "Peak acceleration", "Peak contact force",
-    ]  # fmt: skip
-    assert found[0].change == "from nearly nothing"
-    assert rank_findings([(DEPTH, np.array([-30.0, 2.0, 8.0]), np.zeros(3))], NAMES) == []
-
-
 @pytest.fixture
 def study():
-    """Two speeds and three clearances; the peak grows with the clearance."""
-    peak = np.array([[100.0, 200.0, 400.0], [90.0, 180.0, 360.0]])
-    dims = ("speed_rpm", "clearance_mm")
-    return xr.Dataset(
-        {
-            "status": (dims, np.full((2, 3), "ok", object)),
-            "key": (dims, np.array(list("abcdef"), object).reshape(2, 3)),
-            "peak_acceleration": (dims, peak),
-            "peak_acceleration_error": (dims, 0.01 * peak),
-        },
-        {
-            "speed_rpm": ("speed_rpm", [500.0, 600.0], {"units": "rpm", "case_key": "s"}),
-            "clearance_mm": ("clearance_mm", [0.1, 0.2, 0.3], {"units": "mm", "case_key": "c"}),
-        },
-    )
+    axes = {"speed_rpm": [500.0, 600.0], "clearance_mm": [0.1, 0.2, 0.3]}
+    made = grid(axes, lambda n, c: (1.5 - n / 1000) * 50 * 2 ** (10 * c))  # 100, 200, 400; 90 ...
+    return made.drop_vars(["rms_acceleration", "rms_acceleration_error"])
 
 
 def test_a_study_s_findings_name_its_points(study):
@@ -116,55 +83,45 @@ def test_the_worn_joint_s_force_and_the_reversal_stand_there_though_they_do_not_
         (PEAK, np.array([100.0, 200.0, 300.0]), none),
         (LOSS, np.array([0.0, 0.0, 5.0]), none),
         (TENSION, np.array([1.0, 2.0, 9.0]), none),
-        (next(m for m in MEASURES if m.variable == "rms_acceleration"), np.array([1, 2, 9]), none),
+        (RMS, np.array([1, 2, 9]), none),
         (FORCE, np.array([1.0, 500.0, 900.0]), none),
         (SMALL_END, np.array([80.0, 82.2, 81.0]), none),
         (REVERSAL, steady, np.full(3, 0.1)),
+        (KNOCKS["big_end"], np.array([0.001, 0.02, 0.03]), none),
+        (KNOCKS["small_end"], np.array([0.1, 0.2, 0.7]), none),
+        (RATE, np.array([0.0, 0.0, 999.0]), none),  # counted, and of no ratio: left out
+        (DEPTH, np.array([-30.0, 2.0, 8.0]), none),
     ]
     found = rank_findings(rows, NAMES, {"small_end"})
     assert [one.title for one in found] == [
-        "Time without dry contact, big end", "Peak rod load, tension", "Rms acceleration",
+        "Knock (above 0.25 it knocks), small end", "Time without dry contact, big end",
+        "Peak rod load, tension", "Rms acceleration",
         "Peak contact force, small end", "Rod load reversal",
     ]  # fmt: skip
+    assert found[0].change == "1 of 3 jobs knocks"  # the hardest knock heads the screen
+    assert found[1].change == "from nearly nothing"  # what appears ranks before what grows
     assert (found[-2].high, found[-2].change) == ("80 to 82.20 kN", "nearly the same in all jobs")
     assert (found[-1].low, found[-1].high) == ("", "150.0 ± 0.1 °")
     assert found[-1].change == "the same in all jobs within its error bars"
 
 
-def test_the_hardest_knock_heads_the_first_screen_with_how_many_jobs_knock():
-    none = np.zeros(3)
-    rows = [
-        (LOSS, np.array([0.0, 0.0, 5.0]), none),
-        (KNOCKS["big_end"], np.array([0.001, 0.02, 0.03]), none),
-        (KNOCKS["small_end"], np.array([0.1, 0.2, 0.7]), none),
-    ]
-    first = rank_findings(rows, NAMES, {"big_end", "small_end"})[0]
-    assert first.title == "Knock (above 0.25 it knocks), small end"
-    assert (first.low, first.high, first.change) == ("0.1000", "0.7000", "1 of 3 jobs knocks")
-    quiet = rank_findings([(KNOCKS["small_end"], np.full(3, 0.1), none)], NAMES)[0]
-    assert (quiet.high, quiet.change) == ("0.1000", "none of 3 jobs knocks")
-
-
 def knocking(knock, error, mean=None, regime="periodic", turns=20):
     """A study of the small end's knock over its clearance, 0.1, 0.2 ... mm, out of order."""
-    joint, count = ["big_end", "small_end"], len(knock)
-    dims = ("clearance_mm",)
+    count = len(knock)
 
     def of_joint(values):
-        return (*dims, "joint"), np.stack([np.zeros(count), np.array(values, float)], axis=1)
+        each = np.stack([np.zeros(count), np.array(values, float)], axis=1)
+        return xr.DataArray(each, {"joint": ["big_end", "small_end"]}, ("clearance_mm", "joint"))
 
-    mean = knock if mean is None else mean
-    data = {
-        "status": (dims, np.full(count, "ok", object)), "key": (dims, np.arange(count).astype(str)),
-        "regime": (dims, np.broadcast_to(np.array(regime, object), count)),
-        "knock": of_joint(knock), "knock_error": of_joint(error), "knock_mean": of_joint(mean),
-        "knock_mean_standard_error": of_joint(np.full(count, 0.005)),
-        "revolutions": (dims, np.full(count, float(turns))),
-        "max_penetration": of_joint([1e-6] * count),
-    }  # fmt: skip
-    sizes = 0.1 * np.arange(1, count + 1)
-    at = {"clearance_mm": (dims, sizes, {"units": "mm", "case_key": "clearance_mm"})}
-    data = xr.Dataset(data, {**at, "joint": joint})
+    regimes = np.broadcast_to(np.array(regime, object), count)
+    sizes = {"clearance_mm": 0.1 * np.arange(1, count + 1)}
+    data = grid(sizes, lambda c: c, regime=regimes).assign(
+        knock=of_joint(knock), knock_error=of_joint(error),
+        knock_mean=of_joint(knock if mean is None else mean),
+        knock_mean_standard_error=of_joint([0.005] * count),
+        revolutions=("clearance_mm", np.full(count, float(turns))),
+        max_penetration=of_joint([1e-6] * count),
+    )  # fmt: skip
     return study_findings(data.isel(clearance_mm=np.roll(np.arange(count), 1)))[0]
 
 

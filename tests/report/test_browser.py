@@ -4,7 +4,7 @@ import re
 
 import pytest
 from browsing import axe_script, browser, lacking, live, show, wait_for
-from conftest import store
+from conftest import store_cases
 
 from compressor.report.report import write_report
 
@@ -13,12 +13,8 @@ pytestmark = [
     pytest.mark.slow,
 ]
 EVIL = "<script>window.broken = 1</script><img src=x onerror='window.broken=1'>"
-WORN = """\
-joint: [big_end, small_end]
-clearance_mm: [0.1, 0.2, 0.3]
-machine: {speed_rpm: [300, 500]}
-solve: {accuracy: draft}
-"""
+WORN = {"joint": ["big_end", "small_end"], "clearance_mm": [0.1, 0.2, 0.3],
+        "machine": {"speed_rpm": [300, 500]}, "solve": {"accuracy": "draft"}}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -32,9 +28,7 @@ def own(once):
     """The page of a sweep of one's own, of twelve jobs."""
 
     def made(folder):
-        folder.mkdir()
-        (folder / "worn.yaml").write_text(WORN)
-        store(folder / "results", folder / "worn.yaml")
+        store_cases(folder, worn=WORN)
         write_report(folder / "results", folder, EVIL)
 
     return once("own-report", made)

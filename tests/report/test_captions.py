@@ -5,8 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from compressor.analysis.cycle import Cycle
-from compressor.analysis.runs import CLEARANCES, FAULTS, label
+from compressor.analysis import CLEARANCES, FAULTS, Cycle, label
 from compressor.cases.case import Case
 from compressor.report.figures import FIGURES
 from compressor.report.figures.job import FILM, draw_analyst, draw_orbits
@@ -33,7 +32,6 @@ def numbers(shown):
 
 
 def told(shown, words):
-    """Those of the one label with these words."""
     (found,) = [values for label, values in numbers(shown).items() if words in label]
     return found
 
@@ -147,8 +145,6 @@ def test_a_chaotic_motion_is_told(paper_runs):
     run.attrs = run.attrs | {"regime": "chaotic"}
     assert "The motion is chaotic" in draw_orbits(run, None).caption
 
-
-# ---- rows of a study --------------------------------------------------------------------------
 
 ANGLES = np.arange(360.0)
 

@@ -9,7 +9,6 @@ import plotly.graph_objects as go
 import pytest
 from conftest import decoded
 
-from compressor.report.figures.contours import contour_lines
 from compressor.report.figures.drawing import as_csv, make_grid, outline_cells
 from compressor.report.figures.style import LineStyle, fill, mark, palette
 from compressor.report.interactive import MAX_POINTS, extremes, script
@@ -129,7 +128,6 @@ def test_axes_read_in_the_unit_that_is_wanted():
 
 
 def test_long_curves_keep_their_extremes():
-    """A peak of a single sample among 100,000 is drawn."""
     y = np.sin(np.linspace(0, 20, 100_000))
     y[[31_234, 77_777]] = 9.0, -9.0
     places = extremes(y, MAX_POINTS // 2)
@@ -157,12 +155,6 @@ def test_outlines_hold_the_cells_that_are_in():
     assert (first.min(axis=1).tolist(), first.max(axis=1).tolist()) == ([0, 0], [2, 1])
     assert np.nanmin(second, axis=1).tolist() == [2, 1]
     assert np.nanmax(second, axis=1).tolist() == [3, 2]
-
-
-def test_lines_of_equal_value_lie_where_a_plane_has_them():
-    plane = np.array([[0.0, 1, 2], [0, 1, 2]])
-    x, _ = contour_lines(np.arange(3), np.arange(2), plane, [0.5, 1.5])
-    assert {*x[np.isfinite(x)]} == {0.5, 1.5}
 
 
 def test_a_word_that_is_a_number_stands_in_the_table():

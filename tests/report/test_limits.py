@@ -1,25 +1,22 @@
 """Zones by limits that a user gives, in tables and curves of a study."""
 
-import json
 import math
 import re
 
 import numpy as np
 import pytest
-import xarray as xr
-from compsim import cli
-from conftest import store, without_pictures
+from conftest import store_cases, without_pictures
+from swept_made import grid
 
 from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.sweep import draw_sweep
-from compressor.report.figures.sweep_data import MEASURES, measures
-from compressor.report.figures.sweep_maps import LIMIT
+from compressor.report.figures.sweep_data import MEASURES
+from compressor.report.figures.sweep_panels import LIMIT
 from compressor.report.limits import MORE_IS_BETTER, LimitError, read_limits
 from compressor.report.page import measured_cell
 from compressor.store.reader import open_study
 
 PEAK = next(one for one in MEASURES if one.variable == "sensor_peak")
-VELOCITY = [one for one in MEASURES if one.variable == "body_velocity_rms"]
 
 
 @pytest.mark.parametrize(
@@ -31,20 +28,14 @@ VELOCITY = [one for one in MEASURES if one.variable == "body_velocity_rms"]
         (4.0, math.nan, "B", 1),  # without a bar
         (6.0, 5.0, "A/C", 2),
         (99.0, 1.0, "C", 2),
+        (math.nan, 0.1, "", -1),  # what is not known has no zone
+        (3.0, math.inf, "", -1),
     ],
 )
 def test_a_value_and_its_bar_lie_in_a_zone(value, bar, name, number):
-    zone = read_limits(["sensor_peak=2, 5 m/s2"]).zone(PEAK, value, bar)
-    assert (zone.name, zone.number) == (name, number)
-
-
-def test_what_is_not_known_has_no_zone():
-    limits = read_limits(["sensor_peak=2 m/s²"])
-    assert limits.zone(PEAK, math.nan, 0.1) is None
-    assert limits.zone(PEAK, 3.0, math.inf) is None
-    assert limits.zone(VELOCITY[0], 3.0, 0.1) is None
-    assert read_limits([]).zone(PEAK, 3.0, 0.1) is None
-    assert measured_cell(PEAK, 3.0, math.inf, limits).zone == 0
+    cell = measured_cell(PEAK, value, bar, read_limits(["sensor_peak=2, 5 m/s2"]))
+    assert cell.zone == number + 1
+    assert cell.text.endswith(f" {name}" if name else ("–", "unknown"))
 
 
 def test_limits_in_g_are_limits_in_m_per_s2():
@@ -93,21 +84,24 @@ def test_what_is_no_limit_is_refused(text, message):
         read_limits(["sensor_peak=1g", "sensor_peak=2g"])
 
 
-def test_the_page_and_the_curves_show_the_zones(tmp_path, capsys):
+def test_the_page_and_the_curves_show_the_zones(tmp_path, compsim):
     values = {
         "joint": "big_end", "clearance_mm": [0.05, 0.2], "sensor": True,
         "body": {"frequency_x_Hz": 4.0, "frequency_y_Hz": 30.0},
         "solve": {"duration_rev": 2, "settle_rev": 1, "accuracy": "draft"},
     }  # fmt: skip
-    (tmp_path / "sensed.yaml").write_text(json.dumps(values))
-    store(tmp_path / "results", tmp_path / "sensed.yaml")
+    store_cases(tmp_path, sensed=values)
     study = open_study(tmp_path / "results")
     low, high = study["sensor_peak"].values
     assert high > 1.2 * low
     middle = f"{(low + high) / 2:.6g}"
-    report = ["report", "-r", str(tmp_path / "results"), "-o", str(tmp_path / "out")]
+    report = ["report", "-r", tmp_path / "results", "-o", tmp_path / "out", "--limit"]
+    assert "write 'sensor_peak=3 m/s²'" in compsim(*report, "sensor_peak=3", code=2).err
+    limits = [f"sensor_peak={middle} m/s2", "--limit", "peak_rod_load_tension=3 kN"]
     with without_pictures():
-        assert cli.main([*report, "--limit", f"sensor_peak={middle} m/s2"]) == 0
+        err = compsim(*report, *limits).err
+    told = "no study of this report has peak_rod_load_tension: its limits are shown nowhere"
+    assert told in " ".join(err.split())
     page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     assert re.findall(r'class="zone-(\d)">[^<]* ([A-D/]+)<', page) == [("1", "A"), ("2", "B")]
     sentence = f"A below {middle} m/s², B from {middle} m/s² on."
@@ -116,19 +110,6 @@ def test_the_page_and_the_curves_show_the_zones(tmp_path, capsys):
     lines = {one.title: [rule.y0 for rule in one.rules] for one in panels_of(figure.figure)}
     assert lines["sensor peak"] == [float(middle)]
     assert not lines["sensor rms"]
-    capsys.readouterr()
-    has = {one.variable for one in measures(study)} | {*MORE_IS_BETTER}
-    lacking = next(one for one in MEASURES if one.variable not in has)
-    with without_pictures():
-        assert cli.main([*report, "--limit", f"{lacking.variable}=3 {lacking.unit}"]) == 0
-    told = f"no study of this report has {lacking.variable}: its limits are shown nowhere"
-    assert told in " ".join(capsys.readouterr().err.split())
-    assert cli.main([*report, "--limit", "sensor_peak=3"]) == 2
-    assert "write 'sensor_peak=3 m/s²'" in capsys.readouterr().err
-    with without_pictures():
-        assert cli.main(report) == 0
-    assert "zone-" not in re.sub("<style>.*?</style>", "", (
-        tmp_path / "out" / "index.html").read_text(encoding="utf-8"), flags=re.DOTALL)  # fmt: skip
 
 
 def of_limit(figure):
@@ -138,20 +119,10 @@ def of_limit(figure):
 
 def test_limits_are_lines_in_maps_of_two_numbers():
     """The measure is the product of both axes: along the line it is the limit."""
-    x, y = np.linspace(1.0, 3.0, 9), np.linspace(1.0, 2.0, 5)
-    values = x[:, None] * y
-    shape = ("speed_rpm", "clearance_mm")
-    data = xr.Dataset(
-        {
-            "sensor_peak": (shape, values, {"units": "m/s2"}),
-            "status": (shape, np.full(values.shape, "ok")),
-            "regime": (shape, np.full(values.shape, "")),
-            "key": (shape, np.array([[f"{i}{j}" for j in range(5)] for i in range(9)])),
-        },
-        {"speed_rpm": x, "clearance_mm": y},
-    )
-    (figure,) = [one for one in draw_sweep(data, read_limits(["sensor_peak=3.5,99 m/s2"]))
-                 if one.name == "map"]  # fmt: skip
+    axes = {"speed_rpm": np.linspace(1, 3, 9), "clearance_mm": np.linspace(1, 2, 5)}
+    data = grid(axes, lambda x, y: x * y)
+    limits = read_limits(["peak_acceleration=3.5,99 m/s2"])
+    (figure,) = [one for one in draw_sweep(data, limits) if one.name == "map"]
     (line,) = of_limit(figure.figure)
     known = np.isfinite(line.x)
     np.testing.assert_allclose(line.x[known] * line.y[known], 3.5, rtol=0.02)

@@ -1,7 +1,8 @@
-"""Sweeps as they are drawn: what is drawn are the stored numbers, with their bars and jobs."""
+"""Sweeps as they are drawn: the stored numbers with their bars and jobs, and which key matters."""
 
 import csv
 import io
+import re
 import time
 
 import numpy as np
@@ -10,6 +11,7 @@ import xarray as xr
 from conftest import listed as legend
 from swept_made import grid, listed
 
+from compressor.cases.swept import design
 from compressor.report.figures.drawing import as_csv, panels_of
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.figures.sweep_data import MEASURES, sweep_of
@@ -57,33 +59,10 @@ def test_failed_missing_and_chaotic_jobs_are_marked():
     assert {*legend(drawn.figure)} == {*marks} - {"peak acceleration"}
 
 
-def test_words_are_points_above_their_ticks():
-    (drawn,) = draw_sweep(grid({"load": ["spring", "gas"]}, lambda load: 5 + load))
-    panel = panels_of(drawn.figure)[0]
-    assert panel.x.ticktext == ("spring", "gas")
-    assert panel.traces[0].mode == "markers"
-
-
-def test_what_is_the_same_at_every_job_is_said():
-    data = grid({"clearance_mm": CLEARANCES}, lambda c: 1000 * c)
-    data["rms_acceleration"] = 0 * data["rms_acceleration"] + 7.5
-    (drawn,) = draw_sweep(data)
-    assert [panel.title for panel in panels_of(drawn.figure)] == ["peak acceleration"]
-    assert ("rms acceleration, at every job", "7.5 m/s²") in drawn.numbers
-
-
 def test_where_nothing_ran_nothing_is_drawn():
     data = grid({"clearance_mm": CLEARANCES}, lambda c: c, status=["failed"] * 4)
     assert draw_sweep(data) == []
     assert draw_sweep(grid({"clearance_mm": [0.1]}, lambda c: c)) == []
-
-
-def test_of_very_many_values_some_are_drawn():
-    (drawn,) = draw_sweep(grid({"clearance_mm": np.linspace(0.1, 1, 100_000)}, lambda c: c))
-    (curve,) = panels_of(drawn.figure)[0].traces
-    assert curve.x.size == 1000
-    assert (curve.x[0], curve.x[-1]) == (0.1, 1.0)
-    assert ("values of clearance drawn", "1,000 of 100,000") in drawn.numbers
 
 
 # ---- sampled: points are jobs, and thinning is told
@@ -136,18 +115,6 @@ def test_what_is_not_known_is_marked():
     assert size <= one["a job"].marker.size + 1e-2  # it covers no point
 
 
-def test_many_jobs_are_thinned_with_a_word():
-    rng = np.random.default_rng(6)
-    columns = {name: rng.random(100_000) for name in ("clearance_mm", "speed_rpm", "rod_mass_kg")}
-    data = listed(columns, 1 + columns["clearance_mm"] + 0.1 * rng.random(100_000))
-    start = time.process_time()
-    found = plan(data)
-    assert time.process_time() - start < 5.0
-    for panel in panels_of(found["points"].figure):
-        assert by_name(panel)["a job"].x.size == 2000
-    assert ("jobs drawn", "2,000 of 100,000") in found["points"].numbers
-
-
 # ---- by a second axis: lines are stored jobs, or means
 
 THREE = {"clearance_mm": [0.1, 0.2, 0.3], "speed_rpm": [300.0, 400.0],
@@ -185,15 +152,13 @@ def test_two_axes_with_words_are_lines_of_jobs():
     assert [*second.customdata] == ["k1", "k3", "k5"]
 
 
-@pytest.mark.parametrize(("sizes", "limit"), [((7, 4, 5, 3), 2.0), ((18, 18, 18, 18), 5.0)])
-def test_four_axes_are_few_lines_in_few_panels(sizes, limit):
-    names = ("clearance_mm", "rod_mass_kg", "speed_rpm")
-    axes = {n: np.linspace(1, 2, size) for n, size in zip(names, sizes, strict=False)}
-    axes["load"] = [f"word {n}" for n in range(sizes[3])]
+def test_four_axes_are_few_lines_in_few_panels():
+    axes = {n: np.linspace(1, 2, 18) for n in ("clearance_mm", "rod_mass_kg", "speed_rpm")}
+    axes["load"] = [f"word {n}" for n in range(18)]
     data = grid(axes, lambda c, m, n, load: 100 + c * n + 0.1 * m + load * c)
     start = time.process_time()
     found = plan(data)
-    assert time.process_time() - start < limit
+    assert time.process_time() - start < 5.0
     assert [*found] == ["ranking", "overview"]
     for drawn in found.values():
         panels = panels_of(drawn.figure)
@@ -220,34 +185,19 @@ AXES = {"clearance_mm": [0.1, 0.2, 0.4, 0.5], "speed_rpm": [300.0, 400.0, 500.0]
 def traces(data):
     _, drawn = draw_sweep(data)  # the ranking is the first
     panel = panels_of(drawn.figure)[0]
-    kinds = (
-        "map"
-        if one.type == "heatmap"
-        else "area"
-        if one.fill
-        else {"lines": "line", "markers": "points"}[one.mode]
-        for one in panel.traces
-    )
-    names = (f"{kind}:{one.name}" for kind, one in zip(kinds, panel.traces, strict=True))
-    return drawn, panel, dict(zip(names, panel.traces, strict=True))
+    return drawn, panel, by_name(panel)
 
 
 def test_cells_are_jobs():
     drawn, panel, found = traces(grid(AXES, lambda c, n: 10 * c + n))
-    cells = found["map:peak acceleration"]
+    cells = found["peak acceleration"]
     assert cells.z[:, 0] == pytest.approx([301, 401, 501])
     assert cells.z[0] == pytest.approx([301, 302, 304, 305])
     assert cells.x.tolist() == AXES["clearance_mm"]
     of_csv = csv.DictReader(io.StringIO(as_csv(drawn.figure)))
     values = [row["peak acceleration: peak acceleration: clearance (mm)"] for row in of_csv]
     assert values[:4] == ["0.1", "0.2", "0.4", "0.5"]  # not halfway between cells' edges
-    assert (*cells.customdata.ravel()[:5],) == (
-        "k0",
-        "k3",
-        "k6",
-        "k9",
-        "k1",
-    )  # in C order of the cells
+    assert [*cells.customdata.ravel()[:5]] == ["k0", "k3", "k6", "k9", "k1"]  # row by row
     assert (panel.x.title.text, panel.y.title.text) == ("clearance (mm)", "speed (rpm)")
     assert cells.colorbar.title.text == "m/s²"
     assert drawn.name == "map"
@@ -276,16 +226,16 @@ def test_failed_and_missing_cells_are_marked():
     status = np.full((4, 3), "ok", dtype="U7")
     status[1, 2], status[3, 0] = "failed", "missing"
     _, _, found = traces(grid(AXES, lambda c, n: 10 * c + n, status=status))
-    failed, missing = found["points:a job failed here"], found["points:a job was not run"]
+    failed, missing = found["a job failed here"], found["a job was not run"]
     assert (*failed.x, *failed.y, *failed.customdata) == (0.2, 500, "k5")
     assert (*missing.x, *missing.y, *missing.customdata) == (0.5, 300, "k9")
-    assert np.isnan(found["map:peak acceleration"].z).sum() == 2
+    assert np.isnan(found["peak acceleration"].z).sum() == 2
 
 
 def test_values_and_axes_over_decades_are_logarithmic():
     axes = {"clearance_mm": [0.01, 0.1, 1.0], "speed_rpm": [300.0, 400.0, 500.0]}
     _, panel, found = traces(grid(axes, lambda c, n: c * n))
-    cells = found["map:peak acceleration"]
+    cells = found["peak acceleration"]
     assert panel.x.type == "log"
     assert 10.0 ** cells.z[0] == pytest.approx([3, 30, 300])
     assert cells.x.tolist() == axes["clearance_mm"]
@@ -294,25 +244,40 @@ def test_values_and_axes_over_decades_are_logarithmic():
 def test_words_stand_at_their_cells():
     axes = {"fault": ["big_end", "small_end", "both"], "load": ["spring", "gas", "none"]}
     _, panel, found = traces(grid(axes, lambda joint, load: joint + load))
-    assert [*found] == ["area:", "map:peak acceleration"]
+    assert found["peak acceleration"].type == "heatmap"
     assert panel.x.ticktext == ("big<br>end", "small<br>end", "both<br>joints")
 
 
-def test_large_grids_are_thinned_with_a_word():
-    axes = {"clearance_mm": np.linspace(0.1, 0.9, 4000), "speed_rpm": np.linspace(300, 900, 25)}
-    data = grid(axes, lambda c, n: c * n)
-    data["peak_acceleration"][7, 3] = np.nan  # which is filled for the ranking
+RANDOM = np.random.default_rng(6).random((3, 100_000))
+WIDE = {"clearance_mm": np.linspace(0.1, 0.9, 4000), "speed_rpm": np.linspace(300, 900, 25)}
+
+
+@pytest.mark.parametrize(
+    ("name", "made", "shape", "words"),
+    [
+        ("clearance_mm", lambda: grid({"clearance_mm": RANDOM[0]}, lambda c: c), (1000,),
+         ("values of clearance drawn", "1,000 of 100,000")),
+        ("points", lambda: listed(dict(zip(COLUMNS, RANDOM, strict=False)), RANDOM[0] + RANDOM[2]),
+         (2000,), ("jobs drawn", "2,000 of 100,000")),
+        ("map", lambda: grid(WIDE, lambda c, n: c * n), (25, 64),
+         ("values of clearance drawn", "64 of 4,000")),
+    ],
+)  # fmt: skip
+def test_many_jobs_are_thinned_with_a_word(name, made, shape, words):
+    data = made()
+    data["peak_acceleration"].values.flat[7] = np.nan  # which is filled for the ranking
     start = time.process_time()
-    drawn, _, found = traces(data)
+    drawn = plan(data)[name]
     assert time.process_time() - start < 5.0
-    assert found["map:peak acceleration"].z.shape == (25, 64)
-    assert ("values of clearance drawn", "64 of 4,000") in drawn.numbers
+    of = by_name(panels_of(drawn.figure)[0])
+    trace = of["a job" if name == "points" else "peak acceleration"]
+    assert (trace.z if name == "map" else trace.x).shape == shape
+    assert words in drawn.numbers
 
 
 # ---- grids in order, and lists
 
 PEAK = next(m for m in MEASURES if m.variable == "peak_acceleration")
-RMS = next(m for m in MEASURES if m.variable == "rms_acceleration")
 
 
 def test_numbers_of_a_grid_are_sorted_and_words_are_not():
@@ -329,9 +294,7 @@ def test_numbers_of_a_grid_are_sorted_and_words_are_not():
 
 def test_a_list_of_jobs_is_no_grid_even_where_it_fills_one():
     columns = {"clearance_mm": [0.1, 0.1, 0.2, 0.2], "speed_rpm": [400.0, 500.0] * 2}
-    sweep = sweep_of(listed(columns, range(4)))
-    assert not sweep.is_grid
-    assert sweep.status.shape == (4,)
+    assert [*plan(listed(columns, range(4)))] == ["points"]
 
 
 def test_what_is_rounding_beside_the_other_axis_is_0():
@@ -346,9 +309,79 @@ def test_what_is_rounding_beside_the_other_axis_is_0():
     assert x.of(data) == pytest.approx([9.79, 9.79])
 
 
-def test_what_a_bar_does_not_vouch_for_is_not_known():
-    regime = ["predictable", "chaotic"]
-    sweep = sweep_of(grid({"clearance_mm": [0.1, 0.2]}, lambda c: 100 * c, regime=regime))
-    assert np.isnan(sweep.known(PEAK)).tolist() == [False, True]
-    assert np.isnan(sweep.known(RMS)).tolist() == [False, False]
-    assert sweep.chaotic.tolist() == [False, True]
+# ---- which key matters: bars and sentences say what the effects are
+
+MIXED = {"clearance_mm": [1.0, 2.0, 3.0], "speed_rpm": [1.0, 2.0, 3.0, 4.0],
+         "load": ["spring", "gas"]}  # fmt: skip
+
+
+def bars(drawn):
+    return {
+        panel.title: {trace.name.partition("(")[2].rstrip(")"): trace.x for trace in panel.traces}
+        for panel in panels_of(drawn.figure)
+    }
+
+
+def test_bars_and_caption_are_the_exact_shares():
+    """Of c + 2 n + 0 load: V = 2/3 + 5, without interactions. rms is half of it, thus the same."""
+    drawn = plan(grid(MIXED, lambda c, n, load: 10 + c + 2 * n + 0 * load))["ranking"]
+    found = bars(drawn)
+    share = 500 / (2 / 3 + 5)
+    assert [*found] == ["speed", "clearance", "load"]  # the strongest first
+    for kind in ("main effect", "total effect"):
+        assert found["speed"][kind] == pytest.approx([share] * 2)
+        assert found["clearance"][kind] == pytest.approx([100 - share] * 2)
+        assert found["load"][kind] == pytest.approx([0, 0])
+    words = f"Peak acceleration: speed {share:.0f} %, clearance {100 - share:.0f} %; rms"
+    assert words in drawn.caption
+    panel = panels_of(drawn.figure)[0]
+    assert panel.y.ticktext == ("peak acceleration", "rms acceleration")
+    assert panel.x.title.text == "share of variance (%)"
+
+
+def test_jobs_without_a_value_are_told():
+    status = np.full((3, 4, 2), "ok", dtype="U7")
+    status[1, 1, 0] = "failed"
+    drawn = plan(grid(MIXED, lambda c, n, load: 10 + c + 2 * n + 0 * load, status=status))
+    assert bars(drawn["ranking"])["load"]["total effect"] == pytest.approx([0, 0], abs=1e-6)
+    (label,) = (label for label, value in drawn["ranking"].numbers if value == "up to 1")
+    assert label.endswith("count with the sum of their axes' main effects")
+
+
+def test_correlations_are_told_with_their_intervals():
+    points = np.array(design("lhs", 40, 2, 1))
+    columns = {"clearance_mm": points[:, 0], "speed_rpm": points[:, 1]}
+    drawn = plan(listed(columns, 1 + points[:, 0] + points[:, 1]))["ranking"]
+    told = re.search(
+        r"Peak acceleration: \w+ (\S+) \((\S+) to (\S+)\), \w+ (\S+) \(", drawn.caption
+    )
+    first, low, high, second = map(float, told.groups())
+    assert low < second <= first < high
+    drawn = plan(listed(columns, 1 - 0.9 * points[:, 0] + 0.02 * points[:, 1]))["ranking"]
+    assert "Peak acceleration: clearance −1.00 (−1.00 to −1.00), speed" in drawn.caption
+    panel = panels_of(drawn.figure)[0]
+    (found,) = (trace for trace in panel.traces if trace.type == "bar")
+    assert panel.title == "clearance"
+    assert found.x[0] == pytest.approx(-1.0, abs=0.01)
+    assert found.error_x.array is not None
+
+
+def test_blocks_of_a_design_with_a_failed_job_are_left_out():
+    """y = 1 + x1 + 3 x2, of 64 blocks six with a failed job: the first 32 whole ones count."""
+    points = np.array(design("saltelli", 64, 2, 1))
+    columns = {"clearance_mm": points[:, 0], "speed_rpm": points[:, 1]}
+    status = np.full(256, "ok", dtype="U7")
+    status[[3, 9, 64 + 20, 128 + 30, 192 + 30, 192 + 40, 192 + 50]] = "failed"  # 30 twice
+    drawn = plan(listed(columns, 1 + points[:, 0] + 3 * points[:, 1], status=status))["ranking"]
+    assert "Sobol's indices" in drawn.caption
+    assert ("first whole blocks of the design", "32") in drawn.numbers
+    left_out = [value for label, value in drawn.numbers if label.endswith("are left out")]
+    assert left_out == ["up to 7"]
+
+
+def test_of_a_grid_with_large_gaps_nothing_is_ranked():
+    status = np.full((3, 4, 2), "ok", dtype="U7")
+    status[0] = "missing"
+    status[1, :2] = "failed"
+    data = grid(MIXED, lambda c, n, load: 10 + c + 2 * n + 0 * load, status=status)
+    assert [*plan(data)] == ["overview"]

@@ -4,35 +4,27 @@ import re
 
 import numpy as np
 import pytest
-from conftest import store
+from conftest import store_cases
 
-from compressor.cases.load import load_cases
+from compressor.cases.case import Case
 from compressor.physics import exact_motion
-from compressor.report import plots, side_by_side
+from compressor.report import side_by_side
 from compressor.report.figures.job import NAMES
 from compressor.report.plots import draw_for_page
 from compressor.report.side_by_side import compare_healthy, differing_in_clearance
-from compressor.store.reader import open_study, read_store
-from compressor.store.studies import read_studies
+from compressor.store import open_study, read_store, read_studies
 
 CLEARANCES = (0.3, 0.05, 0.1, 0.2, 0.4, 0.15, 0.25, 0.35)  # as the case file has them
 
 
+SOLVE = {"duration_rev": 1.5, "settle_rev": 0.5, "accuracy": "draft", "error_bars": False}
+CASE = {"joint": "big_end", "clearance_mm": [*CLEARANCES], "body": True, "sensor": True,
+        "solve": SOLVE}  # fmt: skip
+
+
 @pytest.fixture(scope="module")
 def swept(once):
-    """A folder with a small study of clearances, none in order, with a sensor."""
-
-    def make(folder):
-        folder.mkdir(exist_ok=True)
-        file = folder / "own.yaml"
-        file.write_text(
-            f"joint: big_end\nclearance_mm: {[*CLEARANCES]}\n\n"
-            "body: true\nsensor: true\nsolve: {duration_rev: 1.5, settle_rev: 0.5, "
-            "accuracy: draft, error_bars: false}\n"
-        )
-        store(folder, file)
-
-    return once("side-by-side", make)
+    return once("side-by-side", lambda folder: store_cases(folder, own=CASE)) / "results"
 
 
 @pytest.fixture
@@ -41,7 +33,6 @@ def study(swept):
 
 
 def shown(found):
-    """The clearances at the head of the columns."""
     head = found.table.head
     assert head[:2] == ["metric", "without clearance"]
     return [float(re.match(r"clearance (\S+) mm", text)[1]) for text in head[2:]]
@@ -49,8 +40,10 @@ def shown(found):
 
 def test_the_column_without_clearance_is_the_closed_form(swept, study):
     found = compare_healthy(*study)
+    assert shown(found) == sorted(CLEARANCES)
+    assert "Beside it all jobs that differ in clearances alone" in found.words
     numbers = {row.cells[0].text: row.cells for row in found.table.rows}
-    case = load_cases(swept / "own.yaml")[0]
+    case = Case.from_values({})
     lengths = (case.machine.crank_radius_mm / 1e3, case.machine.rod_length_mm / 1e3)
     _, _, a = exact_motion(np.linspace(0.0, 2.0 * np.pi, 36_001), *lengths, case.omega)
     for name, value in (("peak", np.abs(a).max()), ("rms", np.sqrt(np.mean(a[1:] ** 2)))):
@@ -64,16 +57,8 @@ def test_the_column_without_clearance_is_the_closed_form(swept, study):
             )
 
 
-def test_all_jobs_of_a_small_study_stand_there(study):
-    """Five of them did, which the program chose."""
-    found = compare_healthy(*study)
-    assert shown(found) == sorted(CLEARANCES)
-    assert "Beside it all jobs that differ in clearances alone" in found.words
-
-
 @pytest.mark.parametrize("worst", CLEARANCES)
 def test_the_worst_job_stands_there_in_the_order_of_clearance(study, worst, monkeypatch):
-    """Columns stood by rms acceleration, and every third job was taken."""
     monkeypatch.setattr(side_by_side, "MAX_WORN", 5)
     stored, data = study
     data["peak_contact_force"] *= np.where(data["clearance_mm"] == worst, 1e3, 1.0)[:, None]
@@ -114,7 +99,6 @@ def test_a_job_by_itself_and_one_without_clearance(study):
 
 
 def test_a_twin_that_fails_stands_nowhere(swept, study, monkeypatch):
-    """The job is drawn alone."""
     (stored, data), (own,) = study, read_studies(swept)
     drawn = {one.name: one.figure for one in draw_for_page(stored, own, "usual")}
     monkeypatch.setattr(side_by_side, "healthy_twin", lambda run: None)
@@ -125,6 +109,3 @@ def test_a_twin_that_fails_stands_nowhere(swept, study, monkeypatch):
     names = [{trace.name for trace in figures["analyst"].data} for figures in (drawn, alone)]
     assert names[0] - names[1] == {NAMES["twin"]}
     assert NAMES["this"] in names[1]
-    choice = plots.PlotChoice(what=("analyst", "signals"))
-    of_job = plots.job_figures(stored, [own], own.keys[0], choice)
-    assert [one.name for one in of_job] == ["analyst", "signals"]
