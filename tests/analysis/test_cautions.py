@@ -6,10 +6,8 @@ import page_tables
 import pytest
 from test_layers import ROOT
 
-from compressor.analysis.cautions import USUAL_KEYS, Caution, cautions, is_usual, remarks, slips
-from compressor.cases.case import Case
-from compressor.cases.load import load_studies
-from compressor.cases.table import table
+from compressor.analysis.cautions import Caution, cautions, remarks, slips
+from compressor.cases import Case, load_studies
 
 STUDIES = load_studies(*sorted((ROOT / "configs").glob("*.yaml")))
 BIG_END = {"joint": "big_end", "clearance_mm": 0.2}
@@ -97,20 +95,14 @@ def test_what_is_given_or_goes_with_the_defaults_is_not_told_of(values):
     assert not keys & {key for key, _ in odd(**values)}
 
 
-def study(tmp_path, text):
-    path = tmp_path / "odd.yaml"
-    path.write_text(text, encoding="utf-8")
-    return load_studies(path, max_jobs=10**6)[0]
-
-
-def test_a_sweep_is_told_of_once(tmp_path):
-    found = cautions(study(tmp_path, "joint: both\nclearance_mm: [0.2, 0.3, 0.02, 0.03]\n"))
+def test_a_sweep_is_told_of_once(read):
+    found = cautions(read("joint: both\nclearance_mm: [0.2, 0.3, 0.02, 0.03]\n"))
     (one,) = found
     assert (one.key, one.jobs, one.of) == ("clearance_mm", 2, 4)
     assert one.message.startswith("0.02 mm is less than the contact gives way, about 0.0")
 
 
-def test_a_unit_is_told_of_once_and_in_place_of_what_follows_from_it(tmp_path):
+def test_a_unit_is_told_of_once_and_in_place_of_what_follows_from_it(read):
     text = "joint: big_end\nclearance_mm: [0.2, 0.3]\ncontact: {stiffness_N_per_mm15: 336}\n"
     told = (
         "336 N/mm^1.5, where 10000 to 1e+07 is usual; read as kN/mm^1.5: 3.36e+05 "
@@ -118,14 +110,14 @@ def test_a_unit_is_told_of_once_and_in_place_of_what_follows_from_it(tmp_path):
         "3.16228e+07 N/mm^1.5"
     )
     stiffness = "contact.stiffness_N_per_mm15"
-    assert cautions(study(tmp_path, text)) == [Caution(stiffness, told, 2, 2)]
+    assert cautions(read(text)) == [Caution(stiffness, told, 2, 2)]
 
 
-def test_a_large_sweep_is_sampled_evenly_and_always_the_same(tmp_path):
-    many = study(
-        tmp_path,
-        "joint: big_end\nclearance_mm: {linspace: [0.2, 0.4, 40]}\n"
+def test_a_large_sweep_is_sampled_evenly_and_always_the_same(read):
+    many = read(
+        "joint: big_end\nclearance_mm: {linspace: [0.2, 0.4, 20]}\n"
         "machine: {speed_rpm: [500, 20000], rod_mass_kg: {linspace: [3, 5, 25]}}\n",
+        max_jobs=10**6,
     )
     (deep, *_) = found = cautions(many)
     assert found == cautions(many)
@@ -133,10 +125,10 @@ def test_a_large_sweep_is_sampled_evenly_and_always_the_same(tmp_path):
     assert 0.4 < deep.jobs / deep.of < 0.6
 
 
-def test_the_pages_examples_that_are_plain_are_told_nothing(tmp_path):
+def test_the_pages_examples_that_are_plain_are_told_nothing(read):
     text = (page_tables.ROOT / "README.md").read_text(encoding="utf-8")
     example = text.split("```yaml\n# bearing-wear.yaml\n")[1].split("```")[0]
-    assert cautions(study(tmp_path, example)) == []
+    assert cautions(read(example)) == []
 
 
 # ---- slips of units: values that are in another unit, and some that are meant ------------------
@@ -191,22 +183,16 @@ HIDDEN = [(SPEED, 157.08, {}), (SPEED, 251.3, {}), ("gas.discharge_MPa", 3.93, B
 
 
 @pytest.mark.parametrize(("key", "given", "others", "unit", "meant"), SLIPS)
-def test_what_is_in_another_unit_is_told(key, given, others, unit, meant, tmp_path):
-    (found,) = slips(study(tmp_path, json.dumps(values(key, given, **others))).cases)
+def test_what_is_in_another_unit_is_told(key, given, others, unit, meant, read):
+    (found,) = slips(read(json.dumps(values(key, given, **others))).cases)
     assert found.key == key
     assert f"; read as {unit}: " in found.message
     assert found.message.endswith(f" {meant}")
 
 
 @pytest.mark.parametrize(("key", "given", "others"), MEANT + HIDDEN)
-def test_what_is_usual_or_reaches_into_it_is_not(key, given, others, tmp_path):
-    assert slips(study(tmp_path, json.dumps(values(key, given, **others))).cases) == []
-
-
-def test_defaults_are_usual():
-    for key in USUAL_KEYS:
-        default = table()[key].default if key in table() else None
-        assert not default or is_usual(key, default), key
+def test_what_is_usual_or_reaches_into_it_is_not(key, given, others, read):
+    assert slips(read(json.dumps(values(key, given, **others))).cases) == []
 
 
 def test_only_what_reads_a_key_counts():

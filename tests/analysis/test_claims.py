@@ -1,45 +1,23 @@
-"""Relations and claims: on data whose answer is known, and on the paper's cases as data."""
+"""Relations, claims and margins: by hand, with errors that are known, and on the paper's cases."""
+
+import math
 
 import numpy as np
 import pytest
+import xarray as xr
 
-from compressor.analysis.claims import RULES, claim_margins, claims
-from compressor.analysis.margins import Shares, least
-from compressor.analysis.runs import (
-    CLEARANCES,
-    FAULT_LABELS,
-    force_relation,
-    ideal_motion,
-    settled_part,
-)
+from compressor.analysis import CLEARANCES, RULES, claim_margins, claims, ideal_motion, margins
+from compressor.analysis.margins import BarredNumber, Margin
+from compressor.analysis.runs import FAULT_LABELS
 
 
 @pytest.fixture
 def run(paper_runs):
-    """A copy of one run whose series may be changed."""
     return paper_runs["big_end 0.2"].copy(deep=True)
 
 
 def judged(runs, number):
     return claims(runs)[number - 1]
-
-
-def test_settled_leaves_out_the_first_revolution(run):
-    kept = settled_part(run)
-    assert kept["time"].values[0] == pytest.approx(0.12)
-    assert kept.sizes["time"] == 3601
-
-
-def test_force_relation_of_a_line(run):
-    force = 3.5 * run["acceleration"].values + 7
-    run["contact_force"].loc[{"joint": "big_end", "axis": "x"}] = force
-    relation = force_relation(run, "big_end")
-    assert (relation.slope, relation.intercept, relation.r2) == pytest.approx((3.5, 7, 1))
-
-
-def test_ideal_motion_is_the_ideal_machine_s(paper_runs):
-    _, _, a = ideal_motion(paper_runs["design"])
-    assert a == pytest.approx(paper_runs["design"]["acceleration"].values, abs=1e-9)
 
 
 def test_claims_without_runs_are_not_judged():
@@ -49,7 +27,6 @@ def test_claims_without_runs_are_not_judged():
 
 
 def altered(runs, label, name, change):
-    """The runs with one variable of one run changed."""
     other = runs[label].copy(deep=True)
     other[name] = other[name].copy(data=change(other[name].values))
     return {**runs, label: other}
@@ -71,26 +48,21 @@ def test_a_claim_that_holds_can_fail(paper_runs, number, label, name, change):
 
 def with_metric(runs, name, value):
     """The fault runs with a scalar metric that depends on (fault, clearance)."""
-    changed = dict(runs)
     for label in FAULT_LABELS:
         fault, clearance = label.split()
-        changed = altered(
-            changed,
-            label,
-            name,
-            lambda v, f=fault, c=clearance: np.full_like(v, value(f, float(c))),
-        )
-    return changed
+        of = value(fault, float(clearance))
+        runs = altered(runs, label, name, lambda v, of=of: np.full_like(v, of))
+    return runs
 
 
 def test_growing_peaks_hold_exactly_when_all_grow(paper_runs):
-    def grows(_, c):
-        return 1000 * c
-
-    growing = with_metric(with_metric(paper_runs, "peak_acceleration", grows),
-                          "peak_contact_force", grows)  # fmt: skip
+    """By a tenth from clearance to clearance, of which a hundredth is asked for."""
+    growing = paper_runs
+    for name in ("peak_acceleration", "peak_contact_force"):
+        growing = with_metric(growing, name, lambda _, c: 100 * 1.1 ** (10 * c))
     assert judged(growing, 4).held
-    stalled = altered(growing, "both 0.3", "peak_acceleration", lambda v: 0 * v + 200)
+    assert 1.0 + judged(growing, 4).margin.value == pytest.approx(1.1 / 1.01)
+    stalled = altered(growing, "both 0.3", "peak_acceleration", lambda v: 0 * v + 100)
     assert not judged(stalled, 4).held
 
 
@@ -131,8 +103,8 @@ def test_continuous_ringing_at_the_big_end_alone_is_seen(paper_runs):
             run["acceleration"] = run["acceleration"].copy(data=ideal + ringing)
             runs[f"{joint} {clearance:g}"] = run
     before, after = (
-        {name: least(claims(one)[6].margins[n :: len(Shares._fields)])
-         for n, name in enumerate(Shares._fields)}
+        {name: margins.least(claims(one)[6].margins[n :: len(margins.Shares._fields)])
+         for n, name in enumerate(margins.Shares._fields)}
         for one in (paper_runs, runs)
     )  # fmt: skip
     assert before["energy_angle"].value < 0.0 < 0.4 < after["energy_angle"].value
@@ -140,11 +112,83 @@ def test_continuous_ringing_at_the_big_end_alone_is_seen(paper_runs):
     assert claim_margins(runs)[6].value == before["apart"].value == after["apart"].value
 
 
-def test_margins_of_claims_are_those_of_the_page(paper_runs):
-    each = claim_margins(paper_runs)
-    for number, (margin, claim) in enumerate(zip(each, claims(paper_runs), strict=True), 1):
-        assert margin == pytest.approx(claim.margin)
-        assert claim.number == number
-        assert claim.held is (margin.value >= 0.0)
-        assert margin.error >= 0.0
-        assert claim.measured
+# ---- margins: by hand, with errors that are known
+
+
+def test_margins_by_hand():
+    assert margins.at_least(BarredNumber(3.3, 0.3), 3.0) == pytest.approx((0.1, 0.1))
+    assert margins.at_least(BarredNumber(2.4, 0.3), 3.0) == pytest.approx((-0.2, 0.1))
+    assert margins.at_most(BarredNumber(0.02, 0.01), 0.05) == pytest.approx((0.6, 0.2))
+    assert (
+        margins.above(BarredNumber(2.0), 2.0).value
+        < 0.0
+        == margins.at_least(BarredNumber(2.0), 2.0).value
+    )
+    big, small = (BarredNumber(0.2, 0.02), BarredNumber(0.1, 0.01))  # whose errors add
+    assert margins.exceeds(big, small, 0.05) == pytest.approx((0.05, 0.03))
+    assert margins.exceeds(small, big, 0.05) == pytest.approx((-0.15, 0.03))
+    assert big.over(small) == pytest.approx((2.0, 2.0 * (0.1 + 0.1)))  # and of a ratio relative
+    assert big.over(BarredNumber(0.0)).value == math.inf
+
+
+def test_the_least_margin_reaches_as_low_as_any_may_be():
+    assert margins.least([Margin(0.1, 0.01), Margin(0.3, 0.05)]) == pytest.approx((0.1, 0.01))
+    assert margins.least([Margin(0.1, 0.01), Margin(0.3, 0.5)]) == pytest.approx((0.1, 0.3))
+    unknown = margins.least([Margin(0.1, 0.01), Margin(0.3, math.nan)])
+    assert unknown.value == 0.1
+    assert math.isnan(unknown.error)
+
+
+def test_a_chaotic_peak_is_its_mean_over_revolutions():
+    """With Student's t of twelve revolutions, 2.201, for the standard error."""
+    run = xr.Dataset(
+        {"peak_acceleration": 130.0, "peak_acceleration_mean": 120.0, "revolutions": 12.0,
+         "peak_acceleration_mean_standard_error": 2.0, "peak_acceleration_error": np.inf},
+        attrs={"regime": "chaotic"},
+    )  # fmt: skip
+    assert margins.peak(run, "peak_acceleration") == pytest.approx((120.0, 4.402), rel=1e-3)
+    run.attrs["regime"] = "periodic"
+    assert margins.peak(run, "peak_acceleration") == (130.0, math.inf)
+
+
+def test_the_scatter_of_revolutions_is_a_chaotic_value_s_error():
+    """Of 1, 2 and 6 over twelve revolutions: mean 3, standard deviation 2.256."""
+    angle = np.linspace(0.0, 26.0 * np.pi, 1301)
+    level = np.repeat([50.0, *([1.0, 2.0, 6.0] * 4)], 100)
+    run = xr.Dataset(
+        {"a": ("time", np.append(level, 6.0)), "crank_angle": ("time", angle)},
+        {"time": angle / (2.0 * np.pi)}, attrs={"settle": 1.0, "regime": "chaotic"},
+    )  # fmt: skip
+
+    def middle(part):
+        return float(part["a"].median())
+
+    assert len([*margins.revolutions(run)]) == 12
+    found = margins.measure(run, middle, 0.1)
+    assert found == pytest.approx((2.0, 2.201 * 2.256 / math.sqrt(12)), rel=1e-3)
+    run.attrs["regime"] = "periodic"
+    assert margins.measure(run, middle, 0.1) == (2.0, 0.1)
+
+
+def test_error_bars_are_carried_through(paper_runs):
+    """Claim 4's error is that of the two peaks beside its smallest ratio, or of a larger one."""
+    runs = {name: run.copy(deep=True) for name, run in paper_runs.items()}
+    for run in runs.values():
+        for name in ("peak_acceleration", "peak_contact_force"):
+            run[f"{name}_error"] = 0.01 * np.abs(run[name])
+    margin = claims(runs)[3].margin
+    assert margin.error >= 0.0199 * (1.0 + margin.value)
+    for run in runs.values():
+        run["peak_acceleration_error"][...] = np.nan
+    assert math.isnan(claims(runs)[3].margin.error)
+
+
+def test_runs_without_bars_have_margins_without_error(paper_runs):
+    runs = {name: run.copy(deep=True) for name, run in paper_runs.items()}
+    for run in runs.values():
+        for series in ("velocity", "acceleration", "contact_force"):
+            run[f"{series}_error"][...] = np.nan
+    for number in (3, 5, 6, 7):
+        claim = claims(runs)[number - 1]
+        assert math.isnan(claim.margin.error), number
+        assert claim.held in (True, False)

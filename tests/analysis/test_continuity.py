@@ -5,15 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from compressor.analysis.contacts import impacts
-from compressor.analysis.margins import (
-    SLOWEST,
-    evidence,
-    find_shares,
-    hit_error,
-    hit_share,
-    measure_shares,
-)
+from compressor.analysis import impacts, margins
 from compressor.analysis.shaking import whole_revolutions
 from compressor.cases.case import Case
 from compressor.metrics import JOINTS
@@ -21,8 +13,6 @@ from compressor.solve.simulate import simulate
 
 
 class Hit(NamedTuple):
-    """What is read of an `Impact`."""
-
     revolution: int
     crank_angle: float
     approach_speed: float
@@ -31,7 +21,7 @@ class Hit(NamedTuple):
 def test_windows_that_are_hit_are_counted_once():
     hits = [Hit(1, 41.0, 0.3), Hit(1, 49.9, 0.2), Hit(1, 50.1, 0.2), Hit(2, 41.0, 0.3),
             Hit(2, 200.0, 0.009)]  # fmt: skip
-    assert hit_share(hits, 2) == pytest.approx(3 / 72)
+    assert margins.hit_share(hits, 2) == pytest.approx(3 / 72)
 
 
 @pytest.mark.parametrize("share", [0.25, 0.5])
@@ -41,33 +31,26 @@ def test_the_energy_s_angle_is_that_of_a_ringing(paper_runs, share):
     angle = np.degrees(run["crank_angle"].values) % 360
     ringing = 100 * np.cos(np.radians(60 * angle)) * (angle < 360 * share)
     run["contact_force"].loc[{"joint": "big_end", "axis": "x"}] = ringing
-    found = measure_shares(run, "big_end")
+    found = margins.measure_shares(run, "big_end")
     assert found.energy_angle.value == pytest.approx(share * 1.8734 / np.pi, rel=0.03)
     assert (found.apart.value, found.hit.value) == (0.0, 0.0)  # by the eccentricity, as before
 
 
 def test_flight_and_impacts_of_a_machine_that_rattles():
-    loose = {"joint": "big_end", "clearance_mm": 0.3, "machine": {"speed_rpm": 1200}}
-    loose |= {"contact": {"damping_N_s_per_mm": 1}}
-    solve = {"accuracy": "draft", "error_bars": False}
-    run = simulate(Case.from_values({**loose, "solve": solve}))
-    by = evidence(run, "big_end")
-    found = find_shares(by)
-    lost = float(run["contact_loss_fraction"].sel(joint="big_end"))
-    assert lost < found["apart"] < 0.5
-    most = float(run["impact_count"].sel(joint="big_end")) / (36 * by.revolutions)
-    assert 0.5 * most < found["hit"] <= most * (1 + 1e-12)
-
-
-def test_the_evidence_of_a_joint_has_no_impact_of_the_other():
     loose = {"joint": "both", "clearance_mm": 0.3, "machine": {"speed_rpm": 1200}}
     loose |= {"contact": {"damping_N_s_per_mm": 1}}
     solve = {"accuracy": "draft", "error_bars": False}
     run = simulate(Case.from_values({**loose, "solve": solve}))
+    each = [margins.evidence(run, joint) for joint in JOINTS]
+    for joint, by in zip(JOINTS, each, strict=True):
+        found = margins.find_shares(by)
+        lost = float(run["contact_loss_fraction"].sel(joint=joint))
+        assert lost < found["apart"] < 0.5
+        most = float(run["impact_count"].sel(joint=joint)) / (36 * by.revolutions)
+        assert 0.5 * most < found["hit"] <= most * (1 + 1e-12)
+        assert {hit.joint for hit in by.hits} == {joint}
     settled, _ = whole_revolutions(run)
-    found = [hit for joint in JOINTS for hit in evidence(run, joint).hits]
-    assert {hit.joint for hit in found} == {*JOINTS}
-    assert len(found) == len(impacts(settled))
+    assert sum(len(by.hits) for by in each) == len(impacts(settled))
 
 
 def test_shares_have_errors_by_the_run_s_bars(paper_runs):
@@ -75,19 +58,19 @@ def test_shares_have_errors_by_the_run_s_bars(paper_runs):
     run = paper_runs["small_end 0.2"].copy(deep=True)
     run["contact_loss_fraction_error"].loc[{"joint": "small_end"}] = 0.01
     run["contact_force_error"].loc[{"joint": "small_end"}] = 1e-4
-    short = measure_shares(run, "small_end")
+    short = margins.measure_shares(run, "small_end")
     assert short.apart.error == 0.01
     assert short.hit.error == 0.0
     run["contact_force_error"].loc[{"joint": "small_end"}] *= 100.0
-    long = measure_shares(run, "small_end")
+    long = margins.measure_shares(run, "small_end")
     assert 0.0 < short.energy_angle.error < long.energy_angle.error < 1.0
 
 
 def test_an_impact_at_a_window_s_edge_or_of_the_slowest_speed_is_in_doubt(paper_runs):
     """Of four impacts, one lies at an edge and one is as slow as counts."""
-    found = evidence(paper_runs["big_end 0.2"], "big_end")
-    hits = [Hit(2, 45.0, 0.3), Hit(2, 49.9, 0.2), Hit(3, 55.0, SLOWEST), Hit(3, 155.0, 0.5)]
-    assert hit_error(found._replace(hits=hits)) == pytest.approx(2 / 36 / 3)
+    found = margins.evidence(paper_runs["big_end 0.2"], "big_end")
+    hits = [Hit(2, 45.0, 0.3), Hit(2, 49.9, 0.2), Hit(3, 55.0, margins.SLOWEST), Hit(3, 155.0, 0.5)]
+    assert margins.hit_error(found._replace(hits=hits)) == pytest.approx(2 / 36 / 3)
 
 
 def test_a_chaotic_run_s_shares_are_unknown_of_three_revolutions(paper_runs):
@@ -97,15 +80,6 @@ def test_a_chaotic_run_s_shares_are_unknown_of_three_revolutions(paper_runs):
     ringing = np.cos(60 * angle) * ((np.degrees(angle) % 360) < 90.0 * turn)
     run["contact_force"].loc[{"joint": "big_end", "axis": "x"}] = 100.0 * ringing
     run.attrs["regime"] = "chaotic"
-    found = measure_shares(run, "big_end").energy_angle
+    found = margins.measure_shares(run, "big_end").energy_angle
     assert 0.3 < found.value < 0.6  # shares of about 1, 2 and 3 quarters of 0.6
     assert found.error == np.inf
-
-
-def test_the_paper_s_default_machine_is_not_more_continuous_at_the_big_end(paper_runs):
-    """Nothing flies, and the small end rings over more of the angle at 0.1 mm."""
-    big, small = (
-        measure_shares(paper_runs[f"{joint} 0.1"], joint) for joint in ("big_end", "small_end")
-    )
-    assert big.apart.value == small.apart.value == 0.0
-    assert big.energy_angle.value < small.energy_angle.value

@@ -1,13 +1,16 @@
-"""Forces on the frame from stored series: those that the equations of motion give."""
+"""Forces on the frame from stored series, and how joints shake it: equations, Parseval, cases."""
+
+import math
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from compressor.analysis.shaking import NoSeriesError, frame_forces, healthy_twin, whole_revolutions
+from compressor.analysis import NoSeriesError, frame_forces, healthy_twin, paper_cases, shaking
+from compressor.analysis.shaking import whole_revolutions
 from compressor.cases.case import Case
-from compressor.solve.series import SIGNALS
-from compressor.solve.simulate import simulate
+from compressor.solve import SIGNALS, simulate
+from compressor.vibration import RecordError
 
 DRAFT = {"accuracy": "draft", "duration_rev": 2.5, "error_bars": False}
 
@@ -56,19 +59,52 @@ def test_whole_revolutions_leave_the_rest():
         frame_forces(run.isel(time=0))
 
 
-def test_the_healthy_twin_has_ideal_joints_on_the_same_grid():
-    values = {"joint": "both", "clearance_mm": 0.2, "load": "gas", "solve": DRAFT}
-    run = simulate(Case.from_values(values))
-    twin = healthy_twin(run)
-    assert np.array_equal(twin["time"].values, run["time"].values)
-    assert not twin["eccentricity"].values.any()
-    assert Case.from_attribute(twin.attrs["case"]).load == "gas"
-
-
 @pytest.mark.parametrize("more", [{"lubricant": True}, {"wear": True}])
 def test_the_healthy_twin_has_nothing_that_only_a_clearance_can_have(more):
     worn = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, **more, "solve": DRAFT})
     plain = Case.from_values({"solve": DRAFT})
     one, other = (healthy_twin(xr.Dataset(attrs=case.attributes())) for case in (worn, plain))
     assert one["status"].item() == "ok"
+    assert not one["eccentricity"].values.any()
     np.testing.assert_array_equal(one["acceleration"].values, other["acceleration"].values)
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """The least and the greatest clearance at one joint, `accuracy: standard` as by default."""
+    cases = paper_cases()
+    names = [f"{joint} {c}" for joint in ("big_end", "small_end") for c in ("0.1", "0.3")]
+    return {name: simulate(cases[name]) for name in names}
+
+
+@pytest.mark.parametrize(
+    ("name", "above"),
+    [("big_end 0.1", 475), ("big_end 0.3", 1025), ("small_end 0.1", 639), ("small_end 0.3", 555)],
+)
+def test_force_above_order_12_of_the_paper_s_cases(exact, name, above):
+    """Once measured apart from this code, by numpy's Fourier transform of 3 revolutions."""
+    run = exact[name]
+    assert shaking(run).above == pytest.approx(above, rel=0.02)
+    kept = slice(1200, 4800)
+    force = frame_forces(run)["shaking_force"][kept, 0]
+    lines = 2 * np.abs(np.fft.rfft(force) / force.size) ** 2
+    root = math.sqrt(lines[12 * 3 + 1 :].sum() - lines[-1] / 2)
+    assert shaking(run).above == pytest.approx(root, rel=1e-3)
+
+
+def test_a_known_force_has_its_lines(paper_runs):
+    """30 N of order 20 everywhere, and nothing else above order 12."""
+    run = paper_runs["design"]
+    angle = run["crank_angle"].values
+    known = run.assign(piston_force=run["piston_force"] + 30 * np.sin(20 * angle))
+    found = shaking(known)
+    assert found.above == pytest.approx(30 / math.sqrt(2), rel=1e-4)
+    assert found.amplitudes[20] == pytest.approx(30, rel=1e-4)
+
+
+def test_samples_too_coarse_for_its_orders_are_refused(paper_runs):
+    """Without lines above order 12 their rms would be 0."""
+    run = paper_runs["big_end 0.3"]
+    assert shaking(run.isel(time=slice(None, None, 40))).above > 0  # 12 degrees
+    with pytest.raises(RecordError, match="order 12 is not below 12, half the samples a turn: run"):
+        shaking(run.isel(time=slice(None, None, 50)))

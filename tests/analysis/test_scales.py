@@ -2,17 +2,14 @@
 
 import numpy as np
 import pytest
-from random_cases import strangers
 from scipy.integrate import solve_ivp
 
 from compressor.analysis.cautions import contact_depths, greatest_force
 from compressor.cases.case import Case
 from compressor.metrics import JOINTS
 from compressor.physics.contact_laws import Power
+from compressor.solve import record, simulate
 from compressor.solve.request import Stop, check_depth
-from compressor.solve.run import run_at_tolerance
-from compressor.solve.si_record import record
-from compressor.solve.simulate import simulate
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.2])
@@ -37,37 +34,16 @@ def test_contact_time_of_any_exponent(exponent):
 @pytest.mark.parametrize("load", ["spring", "gas", "none"])
 @pytest.mark.parametrize("speed", [200, 2000])
 def test_the_greatest_force_bounds_the_ideal_machine_s(load, speed):
-    values = {"load": load, "machine": {"speed_rpm": speed, "gravity_m_per_s2": 9.81}}
-    case = Case.resolve(values | {"spring": {"damping_N_s_per_mm": 0.5}})
+    values = {"load": load, "machine": {"speed_rpm": speed, "gravity_m_per_s2": 9.81},
+              "spring": {"damping_N_s_per_mm": 0.5}}  # fmt: skip
+    case = Case.resolve(values)
     found = simulate(case)["peak_contact_force"].values
-    for joint, force in zip(JOINTS, found, strict=True):
-        assert force <= greatest_force(record(case), joint) <= 3 * force
-
-
-def test_the_ideal_machine_has_no_scales():
-    case = Case.resolve({"joint": "both", "clearance_mm": 0})
-    assert list(contact_depths(case)) == []
-
-
-@pytest.fixture(scope="module")
-def runs():
-    """Random cases at two tolerances, and how they ended."""
-    found = []
-    for values in strangers(2021, 30):
-        for rtol in (1e-4, 1e-7):
-            solve = {"rtol": rtol, "duration_rev": 2, "settle_rev": 0}
-            case = Case.resolve({**values, "solve": solve})
-            found.append((case, run_at_tolerance(case, case.rtol, 600, False).trajectory))
-    return found
-
-
-def test_penetration_of_random_cases(runs):
-    """The deepest contact of a run, by the static penetration under the greatest force."""
-    ratios = np.array([
-        run.tally.deepest.max() / max(depth for _, depth in contact_depths(case))
-        for case, run in runs
-    ])  # fmt: skip
-    assert ((ratios > 0.5) & (ratios < 2)).mean() >= 0.9
+    most = [greatest_force(record(case), joint) for joint in JOINTS]
+    for bound, force in zip(most, found, strict=True):
+        assert force <= bound <= 3 * force
+    worn = Case.resolve(values | {"joint": "both", "clearance_mm": 0.1})
+    static = (np.array(most) / 1.0625e10) ** (2 / 3)  # of K delta^1.5 under that force
+    assert [depth for _, depth in contact_depths(worn)] == pytest.approx(static, rel=1e-3)
 
 
 @pytest.mark.parametrize(
