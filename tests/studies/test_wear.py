@@ -1,9 +1,10 @@
-"""`compsim wear`: from a case file to lives, figures and files that go on after a kill."""
+"""`compsim wear`: lives, files that go on after a kill, and stages by Archard's law."""
 
+import itertools
 import json
+import math
 import multiprocessing
 import os
-import re
 import signal
 import time
 
@@ -11,12 +12,15 @@ import numpy as np
 import pytest
 from compsim.cli import main
 from conftest import assert_same_bits, jobs_here
+from published import COEFFICIENT, rubbing
 
-from compressor.cases.load import load_cases
+from compressor.analysis.wear import interpolate_hours, rubbing_work
+from compressor.cases import Case, Wear, load_cases
+from compressor.solve import simulate
 from compressor.store.files import StoreError
 from compressor.studies import wear
 from compressor.studies.frame import make_rows, stored_rows
-from compressor.studies.wear import Worn, hours, open_wear
+from compressor.studies.wear import Worn, follow_stage, hours, life, open_wear
 
 TEXT = """
 joint: both
@@ -29,7 +33,6 @@ wear: {limit_mm: 0.23, step_mm: 0.01}
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """A folder with a case file and its results."""
     folder = tmp_path_factory.mktemp("worn")
     (folder / "bearing.yaml").write_text(TEXT, encoding="utf-8")
     return folder
@@ -37,7 +40,6 @@ def place(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def told(place):
-    """What the command gave, and its code."""
     here, out = place / "bearing.yaml", place / "results"
     with jobs_here():
         assert main(["wear", str(here), "-r", str(out), "-j", "2", "--quiet"]) == 0
@@ -47,8 +49,7 @@ def told(place):
 def test_a_line_for_each_machine_says_when_it_is_worn_out(told, place, compsim):
     cases, out = told
     said = compsim("wear", place / "bearing.yaml", "-r", out)
-    head, *lines = said.out.splitlines()
-    assert "worn out after, h" in head
+    _, *lines = said.out.splitlines()
     assert "all 2 machines are stored" in said.err
     numbers = json.loads(compsim("wear", place / "bearing.yaml", "-r", out, "--json").out)
     for line, one, case in zip(lines, numbers, cases, strict=True):
@@ -64,15 +65,6 @@ def test_a_line_for_each_machine_says_when_it_is_worn_out(told, place, compsim):
     figure = out / "wear" / "bearing.png"
     assert str(figure) in said.err
     assert figure.stat().st_size > 10_000
-
-
-def test_stored_stages_are_labelled(told):
-    cases, out = told
-    found = open_wear(out, cases[0])
-    assert found["clearance"].dims == found["rubbing_work"].dims == ("stage", "joint")
-    for name in found.data_vars:
-        assert found[name].attrs["long_name"]
-    assert (np.diff(found["worn_volume"].values, axis=0) > 0).all()
 
 
 @pytest.mark.slow
@@ -128,18 +120,10 @@ def test_a_failed_machine_is_told_and_goes_on_when_asked(
     assert "--rerun" in said.err
     assert "failed: budget_seconds" in said.out
     last = float(open_wear(tmp_path, case)["hours"][-1])  # no machine outlives what was not run
-    factor = case.wear.coefficient_factor
-    bounds = (f"> {hours(times * last)}" for times in (1.0, 1.0 / factor, factor))
-    mid, low, high = (re.escape(bound) for bound in bounds)
-    assert re.search(rf"  {mid} +{low} to {high}  ", said.out)
+    assert f"  > {hours(last)}  " in said.out
     assert main(["wear", str(file), "-r", str(tmp_path), "--rerun"]) == 0
-    assert_same_bits(open_wear(tmp_path, case), whole(worn, tmp_path / "undisturbed"))
-
-
-def whole(worn, folder):
-    """The stages of an undisturbed run."""
-    make_rows(worn, folder)
-    return open_wear(folder, worn.case)
+    make_rows(worn, tmp_path / "undisturbed")
+    assert_same_bits(open_wear(tmp_path, case), open_wear(tmp_path / "undisturbed", case))
 
 
 @pytest.mark.parametrize(
@@ -153,7 +137,6 @@ def whole(worn, folder):
         (TEXT + "lubricant: true\n", "leave out lubricant or wear"),
         (TEXT.replace("0.23", "0.1"), "0.1 mm must be more than the clearance, 0.2 mm"),
         ("joint: [none, big_end]\nclearance_mm: 0.1\nwear: true\n", "none has no bore that wears"),
-        ("joint: none\nwear: true\n", "wear: nothing reads this group: it needs clearance_mm"),
     ],
 )
 def test_what_cannot_wear_is_refused(text, message, tmp_path, compsim):
@@ -172,3 +155,150 @@ def test_a_file_of_something_else_is_told(told, tmp_path):
         stored_rows(Worn(cases[1]), tmp_path)
     with pytest.raises(StoreError, match="compsim wear the case file"):
         open_wear(tmp_path / "nowhere", cases[0])
+
+
+# ---- stages
+
+
+VALUES = {"joint": "big_end", "clearance_mm": 0.2, "solve": {"accuracy": "draft"}}
+
+
+def followed(wear, **values):
+    of = Worn(Case.from_values({**VALUES, **values, "wear": {"limit_mm": 0.26, **wear}}))
+    stages = [of.make_row([])]
+    while not of.over(stages[-1]):
+        stages.append(of.make_row(stages))
+    return of, stages
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return followed({"step_mm": 0.01})
+
+
+def test_a_volume_is_the_coefficient_times_what_has_slid(machine):
+    """V = k N |v| t: by the runs midway, made again."""
+    of, stages = machine
+    found = of.to_dataset(stages)
+    k = 1e-8 * 1e-9  # m3/(N m); over 2 pi (R + c) times the bore's length, by default twice R
+    assert of.bore_area[0] == pytest.approx(2.0 * math.pi * (10e-3 + 0.2e-3) * 20e-3)
+    volume = 0.0
+    for before, after in itertools.pairwise(stages):
+        turns = (after["hours"] - before["hours"]) * 3600.0 / of.case.turn
+        deeper = 0.5 * turns * k * before["rubbing_work"] / of.bore_area
+        midway = follow_stage(of, 0.0, before["clearance"] + deeper)
+        volume += k * midway["rubbing_work"].sum() * turns
+    assert found["worn_volume"].values[-1, 0] == pytest.approx(volume, rel=1e-9)
+    assert not found["worn_volume"].values[:, 1].any()
+    assert not found["clearance"].values[:, 1].any()
+
+
+def test_stages_are_ordinary_runs_at_their_clearances(machine):
+    of, stages = machine
+    stage = stages[2]
+    values = VALUES | {"clearance_mm": 1e3 * float(stage["clearance"][0])}
+    run = simulate(Case.from_values(values))
+    assert of.case_at(stage["clearance"]).key == Case.from_values(values).key
+    solve = VALUES["solve"] | {"output_step_deg": 3.6}
+    coarse = Worn(Case.from_values({**VALUES, "solve": solve, "wear": True}))
+    assert coarse.case_at(stage["clearance"]).key == Case.from_values(values).key
+    assert stage["peak_contact_force"] == pytest.approx(run["peak_contact_force"].values, rel=1e-12)
+
+
+def test_stages_grow_by_their_step_until_the_limit(machine):
+    _, stages = machine
+    opened = [1e3 * stage["clearance"][0] for stage in stages]
+    assert opened[0] == 0.2
+    assert np.diff(opened) == pytest.approx(0.01, rel=0.2)
+    assert opened[-2] < 0.26 <= opened[-1]
+    assert (np.diff([stage["hours"] for stage in stages]) > 0).all()
+
+
+def test_a_coefficient_is_a_scale_of_hours(machine):
+    """The same clearances, a tenth of the hours: what the interval of a life rests on."""
+    of, stages = machine
+    tenfold, faster = followed({"step_mm": 0.01, "coefficient_mm3_per_N_m": 1e-7})
+    one, other = (life(*pair) for pair in (
+        (of, of.to_dataset(stages)), (tenfold, tenfold.to_dataset(faster))))  # fmt: skip
+    assert other.hours == pytest.approx(one.hours / 10, rel=1e-5)
+    assert (one.low, one.high) == pytest.approx((one.hours / 2, one.hours * 2))
+    assert one.joint == "big_end"
+
+
+def test_the_default_step_is_short_enough():
+    """Against a quarter of it; 40 random machines were off by 0.02 % in the median, once by 2 %."""
+    steps = Wear().step_mm, Wear().step_mm / 4
+    pairs = [followed({"step_mm": step}) for step in steps]
+    coarse, fine = (life(of, of.to_dataset(stages)).hours for of, stages in pairs)
+    assert coarse == pytest.approx(fine, rel=2e-3)
+
+
+def test_a_life_beyond_the_hours_is_not_told(machine):
+    """Where even the greatest coefficient does not wear a joint out, no hours are named."""
+    of, stages = followed({"hours": 1.0})
+    found = life(of, of.to_dataset(stages))
+    assert [math.isnan(v) for v in (found.low, found.hours, found.high)] == [True] * 3
+    assert stages[-1]["hours"] == 2.0  # of the given coefficient: as the greatest wears in one
+    assert found.clearance > 0.2e-3
+    whole = life(machine[0], machine[0].to_dataset(machine[1]))
+    of, stages = followed({"step_mm": 0.01, "hours": 0.75 * whole.hours})
+    found = life(of, of.to_dataset(stages))
+    assert found.low == pytest.approx(whole.low, rel=1e-3)
+    assert math.isnan(found.hours)
+    assert math.isnan(found.high)
+
+
+def test_a_motion_that_fails_ends_its_machine():
+    _, stages = followed({}, solve={"accuracy": "draft", "max_steps": 300})
+    assert len(stages) == 1
+    assert stages[0]["reason"] == "budget_steps"
+    assert "300 steps" in stages[0]["detail"]
+
+
+def test_a_speed_that_gives_way_takes_longer_for_a_revolution():
+    soft = {"drive": {"slope_N_m_s": 10.0, "flywheel_kg_m2": 5.0}, "load": "gas"}
+    of = Worn(Case.from_values({**VALUES, **soft, "wear": True}))
+    found = of.make_row([])
+    assert not found["reason"]
+    assert found["turn"] > 1.001 * of.case.turn
+
+
+def test_a_clearance_beyond_the_pin_ends_the_study_with_a_reason():
+    worn = Worn(Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "wear": True}))
+    stage = follow_stage(worn, 0.0, np.array([0.02, 0.0]))
+    assert stage["reason"] == "invalid_input"
+    assert "exceeds the pin radius" in stage["detail"]
+    assert worn.over(stage)
+
+
+# ---- what rubs, and hours between stages
+
+
+@pytest.mark.parametrize(("joint", "more"), [
+    ("big_end", {}), ("small_end", {}), ("big_end", {"drive": {"flywheel_kg_m2": 0.5}}),
+    ("small_end", {"guide": {"clearance_mm": 0.1, "friction": 0}}), ("small_end", {"rod": True}),
+])  # fmt: skip
+def test_what_rubs_is_what_friction_takes_over_its_coefficient(joint, more):
+    """By the ledger of the dense solution; also in time of its own, and with a pin that tilts."""
+    run = simulate(rubbing(joint, **more))
+    here = 0 if joint == "big_end" else 1
+    found = rubbing_work(run)
+    assert found[here] == pytest.approx(float(run["friction_loss"]) / COEFFICIENT, rel=3e-3)
+    assert found[1 - here] == 0.0
+
+
+def test_what_rubs_is_told_a_revolution():
+    """Of settled ones alone: twice as many give the same."""
+    solve = {"settle_rev": 2, "duration_rev": 3, "rtol": 1e-8, "error_bars": False}
+    one, two = (
+        rubbing_work(simulate(rubbing("big_end", solve=solve | {"duration_rev": n}, load="spring")))
+        for n in (3, 4)
+    )
+    assert two[0] == pytest.approx(one[0], rel=1e-3)
+
+
+def test_a_clearance_is_reached_on_a_straight_line():
+    hours, opened = np.array([0.0, 2.0, 3.0]), np.array([1.0, 2.0, 4.0])
+    assert interpolate_hours(hours, opened, 3.0) == 2.5
+    assert [interpolate_hours(hours, opened, one) for one in (0.5, 1.0, 2.0)] == [0.0, 0.0, 2.0]
+    assert math.isinf(interpolate_hours(hours, opened, 4.5))

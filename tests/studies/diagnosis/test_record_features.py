@@ -95,13 +95,6 @@ def test_bands_of_white_noise_are_as_wide_as_they_are():
     assert found["gini"] == pytest.approx(math.sqrt(2) - 1, abs=0.01)  # of a half-normal law
 
 
-@pytest.mark.parametrize("whole", [2, 5, 10])
-def test_noise_is_not_synchronous(whole):
-    found = describe(TIMES, NOISE, TACHO[: whole + 1])
-    scatter = math.sqrt(2 / (RATE / SPEED))
-    assert found["synchronous"] == pytest.approx(1 / whole, rel=4 * scatter)
-
-
 def test_a_turn_that_repeats_itself_is_synchronous():
     found = describe(TIMES, mean_turn(TURNS), TACHO)
     assert found["synchronous"] == pytest.approx(1.0, abs=1e-6)

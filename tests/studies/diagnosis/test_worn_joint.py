@@ -5,16 +5,8 @@ from dataclasses import astuple
 import numpy as np
 import pytest
 
+from compressor.studies.diagnosis import identify
 from compressor.studies.diagnosis.features import FEATURES
-from compressor.studies.diagnosis.identify import (
-    FOLDS,
-    LEVEL,
-    LIMIT,
-    Clearance,
-    Identifier,
-    Library,
-    split_into_folds,
-)
 from compressor.studies.frame import StudyError
 
 JOINTS = np.array(["none", "big_end", "small_end", "both"])
@@ -36,12 +28,12 @@ def made(count, seed, equal=False, joints=JOINTS):
     hidden = np.column_stack([worn, depth])
     features = hidden @ LOADING + rng.normal(0, 0.3, (count, len(FEATURES)))
     keys = np.array([f"{number:020x}" for number in range(count)])
-    return Library("made", keys, told, clearances, features, keys, count, {})
+    return identify.Library("made", keys, told, clearances, features, keys, count, {})
 
 
 @pytest.fixture(scope="module")
 def identifier():
-    return Identifier.fit(made(600, 1))
+    return identify.Identifier.fit(made(600, 1))
 
 
 def test_the_joint_is_told_and_its_clearance_lies_in_its_interval(identifier):
@@ -77,24 +69,22 @@ def test_own_records_fit_and_others_do_not(identifier):
     row[[8, 9]] += (9.0, -9.0)
     answer = identifier.identify(row)
     assert not answer.fits
-    assert answer.p_value < LIMIT
-
-
-def test_no_record_is_so_far_off_that_there_is_no_answer(identifier):
+    assert answer.p_value < identify.LIMIT
+    # none is so far off that there is no answer
     answer = identifier.identify(np.full(len(FEATURES), 1e6))
     assert not answer.fits
     assert np.isfinite([one.probability for one in answer.candidates]).all()
 
 
 def test_a_study_of_one_joint_is_sure_of_it():
-    found = Identifier.fit(made(220, 9, joints=JOINTS[1:2]))
+    found = identify.Identifier.fit(made(220, 9, joints=JOINTS[1:2]))
     (only,) = found.identify(made(1, 10, joints=JOINTS[1:2]).features[0]).candidates
     assert (only.joint, only.probability) == ("big_end", 1.0)
 
 
 def test_too_few_jobs_are_refused():
     with pytest.raises(StudyError, match=r"study made has too few jobs .* none 25, big_end 25"):
-        Identifier.fit(made(100, 12))
+        identify.Identifier.fit(made(100, 12))
 
 
 # clearances whose posterior is known exactly: conjugate Gaussian
@@ -114,7 +104,7 @@ def drawn(count, seed):
 @pytest.fixture(scope="module")
 def clearance():
     points, logs = drawn(600, 1)
-    return Clearance.fit(points, logs[:, None], np.arange(600))
+    return identify.Clearance.fit(points, logs[:, None], np.arange(600))
 
 
 def test_intervals_are_the_exact_ones(clearance):
@@ -125,7 +115,7 @@ def test_intervals_are_the_exact_ones(clearance):
     spread = precision**-0.5
     assert np.sqrt(((best - mean) ** 2).mean()) < 0.3 * spread
     assert np.median(high - low) == pytest.approx(2 * NORMAL_95 * spread, rel=0.1)
-    assert ((low <= logs) & (logs <= high)).mean() == pytest.approx(LEVEL, abs=0.05)
+    assert ((low <= logs) & (logs <= high)).mean() == pytest.approx(identify.LEVEL, abs=0.05)
 
 
 def test_intervals_are_wide_where_errors_are_great():
@@ -133,7 +123,7 @@ def test_intervals_are_wide_where_errors_are_great():
     rng = np.random.default_rng(3)
     logs = rng.uniform(-3.0, 0.0, 400)
     points = (logs + rng.normal(0, 1.0, 400) * 0.1 * (3.2 + logs))[:, None]
-    found = Clearance.fit(points, logs[:, None], np.arange(400))
+    found = identify.Clearance.fit(points, logs[:, None], np.arange(400))
     widths = [
         np.log(one.high / one.low) for (one,) in map(found.locate, np.array([[-2.7], [-0.5]]))
     ]
@@ -143,8 +133,11 @@ def test_intervals_are_wide_where_errors_are_great():
 def test_a_machine_is_judged_by_others_alone():
     machines = np.repeat(np.arange(40), 5)
     labels = np.array(["none", "both"])[machines % 2]
-    for others, own in split_into_folds(labels, machines):
+    for others, own in identify.split_into_folds(labels, machines):
         assert not {*machines[others]} & {*machines[own]}
         assert {*labels[others]} == {"none", "both"}
     # of one sound machine each job stands for itself
-    assert len(split_into_folds(labels, np.where(labels == "none", 0, machines))) == FOLDS
+    assert (
+        len(identify.split_into_folds(labels, np.where(labels == "none", 0, machines)))
+        == identify.FOLDS
+    )

@@ -8,17 +8,10 @@ import pytest
 from compressor.cases.case import Case
 from compressor.physics.record import FREEDOMS
 from compressor.physics.systems import start
-from compressor.solve.request import Request
-from compressor.solve.run import integrate
+from compressor.solve import Request, integrate, natural_sizes, record
 from compressor.solve.search import PARTED_DISTANCE, SHIFT, predictability_horizon
-from compressor.solve.si_record import natural_sizes, offsets, record, scene
-from compressor.studies.follow.lyapunov import (
-    LOST_DISTANCE,
-    OF_STEPS,
-    growths,
-    largest_exponent,
-    mean_with_error,
-)
+from compressor.solve.si_record import offsets, scene
+from compressor.studies.follow import lyapunov
 
 LIGHT = {"joint": "big_end", "clearance_mm": 0.2, "contact": {"damping_N_s_per_mm": 0.336}}
 
@@ -39,9 +32,6 @@ def settled(made, revolutions=12, rtol=1e-10, begin=None):
     return integrate(Request(record(made), y, times, 0.0, rtol)).states[-1]
 
 
-# Known answers
-
-
 def logistic(x):
     """The logistic map at r = 4, whose exponent is ln 2."""
 
@@ -58,8 +48,8 @@ def rates(found):
 
 
 def test_the_logistic_map_has_ln_2():
-    found = growths(logistic(np.array([0.3])), np.array([1e-9]), 8000)
-    value, error = mean_with_error(rates(found))
+    found = lyapunov.growths(logistic(np.array([0.3])), np.array([1e-9]), 8000)
+    value, error = lyapunov.mean_with_error(rates(found))
     assert abs(value - math.log(2)) < error < 0.03
 
 
@@ -71,27 +61,26 @@ def test_a_linear_oscillator_has_its_slowest_decay(damping, expected):
     period = 0.05 * math.pi / 2.0 / math.sqrt(abs(1 - damping**2))
     map_ = (vectors @ np.diag(np.exp(values * period)) @ np.linalg.inv(vectors)).real
     push = np.array([1e-6, 1e-6])
-    found = growths(lambda difference: (map_ @ difference)[np.newaxis], push, 4000)
+    found = lyapunov.growths(lambda difference: (map_ @ difference)[np.newaxis], push, 4000)
     assert not any(one.lost for one in found)
-    value, error = mean_with_error(rates(found)[400:] / period)
+    value, error = lyapunov.mean_with_error(rates(found)[400:] / period)
     assert value == pytest.approx(expected, abs=1e-6)
     assert abs(value - expected) <= error + 1e-9
 
 
 @pytest.mark.parametrize("factor", [1e-9, 0.0])
 def test_a_difference_that_errors_swallow_gives_a_bound(factor):
-    found = growths(lambda difference: factor * difference[np.newaxis], np.array([1e-7]), 5)
+    found = lyapunov.growths(
+        lambda difference: factor * difference[np.newaxis], np.array([1e-7]), 5
+    )
     assert all(one.lost for one in found)
-    assert rates(found) == pytest.approx(math.log(LOST_DISTANCE / 1e-7))
+    assert rates(found) == pytest.approx(math.log(lyapunov.LOST_DISTANCE / 1e-7))
 
 
 def test_errors_hold_as_often_as_they_say():
     draws = np.random.default_rng(4).normal(size=(400, 64))
-    hits = [abs(value) <= error for value, error in map(mean_with_error, draws)]
+    hits = [abs(value) <= error for value, error in map(lyapunov.mean_with_error, draws)]
     assert 0.91 < np.mean(hits) < 0.985
-
-
-# Machines
 
 
 @pytest.mark.parametrize("joint", ["big_end", "small_end"])
@@ -105,9 +94,9 @@ def test_of_a_periodic_motion_it_is_the_largest_floquet_multiplier(joint):
     ]
     multipliers = np.linalg.eigvals((np.subtract(*ends) / size / 2e-4).T)
     expected = math.log(np.abs(multipliers).max())
-    found = largest_exponent(made, y, 16, math.inf)
+    found = lyapunov.largest_exponent(made, y, 16, math.inf)
     # from other revolutions on it is 0.004 or, rarely, 0.013 off: by rounding, as steps fall
-    assert found.value == pytest.approx(expected, abs=2 * OF_STEPS)
+    assert found.value == pytest.approx(expected, abs=2 * lyapunov.OF_STEPS)
     # of four batches of revolutions, whose scatter Student's t takes times 3.2
     assert abs(found.value - expected) < found.error < 0.1
     assert not found.at_most
@@ -115,7 +104,7 @@ def test_of_a_periodic_motion_it_is_the_largest_floquet_multiplier(joint):
 
 def test_of_a_chaotic_motion_it_is_the_rate_at_which_motions_part():
     made = case(LIGHT)
-    found = largest_exponent(made, settled(made, 4, 1e-8), 12, math.inf)
+    found = lyapunov.largest_exponent(made, settled(made, 4, 1e-8), 12, math.inf)
     rate = math.log(PARTED_DISTANCE / SHIFT) / (predictability_horizon(made) / made.turn)
     assert found.value - found.error > 0.0
     assert 0.5 * rate < found.value < 2.0 * rate
@@ -125,5 +114,5 @@ def test_explicit_steps_that_stability_holds_do_not_part_motions():
     """Of a motion with heavy damping, by the shifted run's own steps."""
     heavy = {"damping_N_s_per_mm": 336e2}
     made = case({"joint": "small_end", "clearance_mm": 0.2, "contact": heavy})
-    found = largest_exponent(made, settled(made, 4, 1e-6), 4, math.inf)
+    found = lyapunov.largest_exponent(made, settled(made, 4, 1e-6), 4, math.inf)
     assert -1.1 < found.value < -0.8

@@ -1,31 +1,16 @@
 """Variants: which a case has, what they assume, and that they move metrics so far."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import write_cases
 
-from compressor.cases.case import Case
-from compressor.cases.checks import row_of
-from compressor.cases.laws import CONTACT_LAWS
-from compressor.cases.load import load_studies
-from compressor.cases.plausible import PLAUSIBLE
+from compressor.cases import CONTACT_LAWS, PLAUSIBLE, Case, load_studies, row_of
 from compressor.metrics import METRICS
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_job
-from compressor.studies.tradeoff import variants as module
-from compressor.studies.tradeoff.variants import (
-    FEATURES,
-    ITSELF,
-    change,
-    choose_job,
-    contact_values,
-    explain_models,
-    other_models,
-    vary_numbers,
-)
+from compressor.studies.tradeoff import variants
 from compressor.sweep.sweep import sweep
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0}
@@ -37,12 +22,7 @@ def case(**values):
     return Case.from_values({**base, **values})
 
 
-def by_name(values):
-    return {one.name: one for one in other_models(values)}
-
-
 def applied(values, base):
-    """The values of a feature for a case, whether they are a function of it or not."""
     return values(base) if callable(values) else values
 
 
@@ -51,21 +31,16 @@ def few(monkeypatch):
     """Of the variants those named, which need no equations of features."""
 
     def kept(names=THREE):
-        for function in ("other_models", "vary_numbers"):
-            whole = getattr(module, function)
-
-            def some(*of, whole=whole):
-                return [one for one in whole(*of) if one.name in names]
-
-            monkeypatch.setattr(module, function, some)
+        for function in (variants.other_models, variants.vary_numbers):
+            monkeypatch.setattr(
+                variants, function.__name__,
+                lambda *of, whole=function: [one for one in whole(*of) if one.name in names],
+            )  # fmt: skip
 
     return kept
 
 
-# ---- features -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("feature", FEATURES, ids=lambda feature: feature.name)
+@pytest.mark.parametrize("feature", variants.FEATURES, ids=lambda feature: feature.name)
 def test_a_feature_that_is_left_out_is_no_longer_paid_for(feature):
     of_gas = feature.key.startswith("gas")
     rich = case(
@@ -74,16 +49,16 @@ def test_a_feature_that_is_left_out_is_no_longer_paid_for(feature):
         load="gas" if of_gas or feature.word == "spring" else "spring",
         gas={"back_pressure_MPa": 0.1} if of_gas else {},
     )
-    rich = rich if feature.is_in(rich) else change(rich, applied(feature.given, rich))
+    rich = rich if feature.is_in(rich) else variants.change(rich, applied(feature.given, rich))
     assert feature.is_in(rich)
     assert Case.from_values(rich.values()) == rich
     if feature.left_out is None:
         return
-    poor = change(rich, applied(feature.left_out, rich))
+    poor = variants.change(rich, applied(feature.left_out, rich))
     assert not feature.is_in(poor)
     assert Case.from_values(poor.values()) == poor  # still a valid case
     added = applied(feature.given, poor)
-    assert added is None or feature.is_in(change(poor, added))
+    assert added is None or feature.is_in(variants.change(poor, added))
 
 
 @pytest.mark.parametrize("law", CONTACT_LAWS)
@@ -91,26 +66,20 @@ def test_a_feature_that_is_left_out_is_no_longer_paid_for(feature):
 def test_each_contact_law_may_stand_in_place_of_each_other(law, other):
     """With what the case has; what it has not is a default."""
     plain = case(contact={"stiffness_N_per_mm15": 5e5, "damping_N_s_per_mm": 100})
-    one = change(plain, contact_values(law, plain))
-    two = change(one, contact_values(other, one))
+    one = variants.change(plain, variants.contact_values(law, plain))
+    two = variants.change(one, variants.contact_values(other, one))
     assert Case.from_values(two.values()) == two
     assert two.contact.law == other
     if {law, other} <= {"impact", "hertz", "flores", "lankarani_nikravesh"}:
         assert two.contact.stiffness_N_per_mm15 == 5e5
 
 
-# ---- other models -------------------------------------------------------------------------------
-
-
 def test_the_other_models_of_a_plain_case():
-    assert [*by_name(case())] == [
-        "contact law: hertz", "contact law: hunt_crossley", "contact law: lankarani_nikravesh",
-        "contact law: flores", "contact law: gonthier", "contact law: hu_guo",
-        "contact law: johnson", "contact law: liu", "friction law: coulomb_tanh",
-        "friction law: threlfall", "friction law: ambrosio", "friction law: lugre",
-        "play of the guide", "oil film", "elastic rod", "contact stiffness ÷ 2",
-        "contact stiffness × 2", "contact damping ÷ 2", "contact damping × 2",
-    ]  # fmt: skip
+    names = {one.name for one in variants.other_models(case())}
+    laws = {f"contact law: {law}" for law in CONTACT_LAWS if law != "impact"}
+    ends = {f"contact {of} {how} 2" for of in ("stiffness", "damping") for how in "÷×"}
+    rest = {"friction law: lugre", "play of the guide", "oil film", "elastic rod"}
+    assert laws | ends | rest <= names
 
 
 # ---- numbers in doubt ---------------------------------------------------------------------------
@@ -128,23 +97,16 @@ output: {signals: true}
 """
 
 
-def read_study(tmp_path, text=PLANT):
-    path = Path(tmp_path / "plant.yaml")
-    path.write_text(text, encoding="utf-8")
-    return load_studies(path)[0]
-
-
 def ends(study):
-    """The values at which each number in doubt is run, by its key."""
     found = {}
-    for one in vary_numbers(study, 1):
+    for one in variants.vary_numbers(study, 1):
         assert one.name.startswith(f"{one.varied} ")
         found.setdefault(one.varied, []).append(float(one.name.removeprefix(one.varied)))
     return found
 
 
-def test_what_the_file_leaves_out_or_can_only_guess_is_varied(tmp_path):
-    found = ends(read_study(tmp_path))
+def test_what_the_file_leaves_out_or_can_only_guess_is_varied(read):
+    found = ends(read(PLANT))
     assert found["lubricant.viscosity_mPa_s"] == [20, 80]  # given: a guess all the same
     assert found["lubricant.bearing_length_mm.big_end"] == [35, 87.5]
     assert found["lubricant.bearing_length_mm.small_end"] == [25, 62.5]
@@ -164,11 +126,11 @@ def test_what_the_file_leaves_out_or_can_only_guess_is_varied(tmp_path):
 PAPER_RIG = "joint: big_end\nclearance_mm: 0.2\nload: gas\n"
 
 
-def test_a_varied_number_of_the_gas_leaves_corners_and_back_pressure(tmp_path):
+def test_a_varied_number_of_the_gas_leaves_corners_and_back_pressure(read):
     """Else the exponent had a share of what the corners and the atmosphere change."""
     for gas in ("{switching: exact}", "{discharge_MPa: 0.5}", "{action: single}"):
-        study = read_study(tmp_path, f"{PAPER_RIG}gas: {gas}\n")
-        rows = [one for one in vary_numbers(study, 0) if one.varied.startswith("gas.")]
+        study = read(f"{PAPER_RIG}gas: {gas}\n")
+        rows = [one for one in variants.vary_numbers(study, 0) if one.varied.startswith("gas.")]
         assert {"gas.exponent", "gas.suction_MPa"} < {one.varied for one in rows}
         for one in rows:
             name = one.varied.removeprefix("gas.")
@@ -176,8 +138,8 @@ def test_a_varied_number_of_the_gas_leaves_corners_and_back_pressure(tmp_path):
             assert replace(study.cases[0].gas, **value) == one.case.gas, one.name
 
 
-def test_the_paper_s_corners_are_of_its_own_cylinder(tmp_path):
-    rows = [one for one in vary_numbers(read_study(tmp_path, PAPER_RIG), 0)
+def test_the_paper_s_corners_are_of_its_own_cylinder(read):
+    rows = [one for one in variants.vary_numbers(read(PAPER_RIG), 0)
             if one.varied.startswith("gas.")]  # fmt: skip
     names = ["head_clearance_mm", "suction_MPa", "discharge_MPa", "exponent"]
     assert [one.varied for one in rows if not one.case] == [f"gas.{name}" for name in names]
@@ -189,9 +151,9 @@ def test_the_paper_s_corners_are_of_its_own_cylinder(tmp_path):
     ]
 
 
-def test_an_end_that_cannot_be_says_why(tmp_path):
-    study = read_study(tmp_path, PLANT.replace("big_end: 70", "big_end: 110"))
-    (one,) = (x for x in vary_numbers(study, 1) if x.name.endswith(".big_end 137.5"))
+def test_an_end_that_cannot_be_says_why(read):
+    study = read(PLANT.replace("big_end: 70", "big_end: 110"))
+    (one,) = (x for x in variants.vary_numbers(study, 1) if x.name.endswith(".big_end 137.5"))
     assert one.case is None
     assert one.note.startswith("cannot be: lubricant.bearing_length_mm.big_end: is 1.15 times")
 
@@ -206,24 +168,24 @@ def test_every_plausible_range_lies_within_what_its_key_allows():
             assert span.low < span.high
 
 
-def test_the_job_with_the_greatest_stored_force_is_varied(tmp_path, in_process):
+def test_the_job_with_the_greatest_stored_force_is_varied(read, tmp_path, in_process):
     text = (
         "joint: big_end\nclearance_mm: [0.1, 0.3, 0.2]\nsolve: {duration_rev: 0.25, settle_rev: 0}"
     )
-    study = read_study(tmp_path, text)
-    assert choose_job(study, tmp_path / "kept")[0] == 1
+    study = read(text)
+    assert variants.choose_job(study, tmp_path / "kept")[0] == 1
     sweep([study], tmp_path / "kept")
     forces = [read_job(tmp_path / "kept", key)["peak_contact_force"].max() for key in study.keys]
-    job, why = choose_job(study, tmp_path / "kept")
+    job, why = variants.choose_job(study, tmp_path / "kept")
     assert job == int(np.argmax(forces))
     assert why == "the one of 3 jobs with the greatest stored contact force"
 
 
-def test_rod_load_body_and_sensor_are_compared(few, tmp_path):
+def test_rod_load_body_and_sensor_are_compared(few, read):
     few(("body.casing_mass_kg 240",))
     text = "joint: big_end\nclearance_mm: 0.2\noutput: {signals: true}\nbody: {mass_kg: 3000}\n"
     text += "sensor: {noise_m_per_s2: 0}\nsolve: {duration_rev: 2, accuracy: draft}\n"
-    data = explain_models(read_study(tmp_path, text), 0)
+    data = variants.explain_models(read(text), 0)
     level = data["sensor_rms"].values
     # all that it hears but the body's own motion, which is little, goes as the mode's inverse mass
     assert level[1] / level[0] == pytest.approx(0.5, rel=0.02)
@@ -237,11 +199,13 @@ def test_the_table_is_that_of_runs_made_by_hand(few, tmp_path):
               "body": {"start": "rest"}}  # fmt: skip
     (study,) = load_studies(*write_cases(tmp_path, worn=values))
     seen = []
-    data = explain_models(study, 0, progress=lambda done, total, _: seen.append((done, total)))
-    assert {*data["choice"].values} == {ITSELF, *THREE}
+    data = variants.explain_models(
+        study, 0, progress=lambda done, total, _: seen.append((done, total))
+    )
+    assert {*data["choice"].values} == {variants.ITSELF, *THREE}
     assert [*dict.fromkeys(seen)] == [(n, 4) for n in (0, 1, 2, 3, 4)]
     by_hand = {
-        ITSELF: {},
+        variants.ITSELF: {},
         "contact stiffness × 2": {"contact": {"stiffness_N_per_mm15": 6.72e5}},
         "friction law: threlfall": {"friction": {"law": "threlfall"}},
         "contact law: flores": {"contact": {"law": "flores", "restitution": 0.9}},

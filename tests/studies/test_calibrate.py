@@ -1,8 +1,18 @@
-"""Fits of orders by a model in closed form: an oscillator under harmonic forces."""
+"""`compsim calibrate`: fits of an oscillator in closed form, and of a simulated record."""
+
+import contextlib
+import io
+import json
+from pathlib import Path
 
 import numpy as np
 import pytest
+from compsim import cli
+from conftest import jobs_here
 
+from compressor.cases import Case, load_cases
+from compressor.solve.simulate import simulate
+from compressor.store.reader import read_store
 from compressor.studies.calibrate import MODEL_ERROR, fit_orders, orders_of
 from compressor.vibration import Record
 
@@ -38,7 +48,7 @@ def design(unknowns, seed=1):
     return np.random.default_rng(seed).random((12 * unknowns, unknowns))
 
 
-def fitted(truth, seed, **kinds):
+def fit_of(truth, seed, **kinds):
     amplitudes, errors = measured(truth, seed, **kinds)
     mass = kinds.get("mass", True)
     return fit_orders(
@@ -48,7 +58,7 @@ def fitted(truth, seed, **kinds):
 
 def test_known_numbers_come_back():
     truth = np.array([0.3, 0.6, 0.8])
-    found = fitted(truth, 1, noise=1e-9, mass=False)
+    found = fit_of(truth, 1, noise=1e-9, mass=False)
     # the drifts take a share of what a force of 2 % of the range less would explain
     assert found.shares == pytest.approx(truth, abs=0.01)
     assert found.misfit < 0.1
@@ -62,7 +72,7 @@ def test_intervals_hold_where_the_model_errs_as_it_may():
     inside, sizes = [], []
     for seed in range(100):
         truth = 0.15 + 0.7 * rng.random(3)
-        found = fitted(truth, seed, model=MODEL_ERROR, mass=False)
+        found = fit_of(truth, seed, model=MODEL_ERROR, mass=False)
         off = (found.shares - truth) / found.deviations
         inside += (np.abs(off) < 1.96).tolist()
         sizes += off.tolist()
@@ -73,7 +83,7 @@ def test_intervals_hold_where_the_model_errs_as_it_may():
 def test_what_is_not_told_apart_is_named():
     """Force and mass: their ratio alone is heard; each stays as wide as the other's range lets."""
     truth = np.array([0.3, 0.6, 0.5, 0.5])
-    found = fitted(truth, 3)
+    found = fit_of(truth, 3)
     assert found.open_directions == ((2, 3),)
     assert found.deviations[0] < 0.02 < 0.15 < found.deviations[2]
     ratio = (1 + found.shares[2]) / (1 + found.shares[3])
@@ -81,9 +91,9 @@ def test_what_is_not_told_apart_is_named():
 
 
 def test_a_machine_that_is_another_says_so():
-    found = fitted(np.array([0.3, 0.6, 0.8]), 4, model=0.2, mass=False)
+    found = fit_of(np.array([0.3, 0.6, 0.8]), 4, model=0.2, mass=False)
     assert found.misfit > 5.0
-    usual = fitted(np.array([0.3, 0.6, 0.8]), 4, model=MODEL_ERROR, mass=False)
+    usual = fit_of(np.array([0.3, 0.6, 0.8]), 4, model=MODEL_ERROR, mass=False)
     assert found.deviations.min() > 3.0 * usual.deviations.min()
 
 
@@ -119,3 +129,81 @@ def test_orders_are_amplitude_and_phase_from_top_dead_centre():
     scatter = 2 * 0.1 / np.sqrt(rate / speed) / np.sqrt(found.revolutions)
     assert np.median(found.errors) == pytest.approx(scatter, rel=0.2)
     assert found.amplitudes.size == int(rate / 2.56 / speed)
+
+
+# ---- the command: a simulated record gives its own machine back
+
+
+CASE = {
+    "load": "gas",
+    "gas": {"switching": "exact"},
+    "body": True,
+    "sensor": {
+        "rate_Hz": 2560, "mounting_Hz": 2500, "noise_m_per_s2": 0.001, "length_rev": 8,
+    },
+    "solve": {"duration_rev": 2},
+}  # fmt: skip
+TRUTH = {"machine.reciprocating_mass_kg": 16.0, "body.mass_kg": 450.0}
+FIT = ["--fit", "machine.reciprocating_mass_kg=10:20", "--fit", "body.mass_kg=300:600"]
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    place = tmp_path_factory.mktemp("calibrate")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(place)
+        Path("machine.yaml").write_text(json.dumps(CASE))
+        truth = {"machine": {"reciprocating_mass_kg": 16.0}, "body": {"mass_kg": 450.0}}
+        run = simulate(Case.from_values(CASE | truth))
+        times, values = run["sensor_time"].values, run["sensor_acceleration"].values
+        tacho = np.isin(np.arange(times.size), np.searchsorted(times, run["tacho_time"].values))
+        rows = np.column_stack((times, values, tacho))
+        head = "time_s,acceleration_m_per_s2,tacho"
+        np.savetxt("healthy.csv", rows, delimiter=",", header=head, comments="", fmt="%.12g")
+        words = ["calibrate", "healthy.csv", "machine.yaml", *FIT, "-j", "1", "--quiet"]
+        with jobs_here(), contextlib.redirect_stdout(io.StringIO()) as out:
+            assert cli.main(words) == 0
+        yield place, words, out.getvalue()
+
+
+def test_the_machine_of_a_record_comes_back(fitted, monkeypatch, compsim):
+    """Values in their intervals, these narrow; asked again nothing runs."""
+    place, words, _ = fitted
+    monkeypatch.chdir(place)
+    stored = len(read_store("results").keys())
+    found = json.loads(compsim(*words, "--json").out)
+    for key, value in TRUTH.items():
+        one = found["keys"][key]
+        assert one["low"] < value < one["high"]
+        assert one["high"] - one["low"] < 0.25 * value
+        assert one["value"] == pytest.approx(value, rel=0.06)
+    assert found["misfit"] < 1.5
+    assert found["explained"] > 0.99
+    assert found["not_told_apart"] == []
+    assert found["speed_rpm"] == pytest.approx(500.0, abs=0.05)
+    assert len(read_store("results").keys()) == stored
+
+
+def test_what_is_printed_is_a_case_file(fitted, monkeypatch):
+    place, _, text = fitted
+    monkeypatch.chdir(place)
+    Path("sound.yaml").write_text(text)
+    (case,) = load_cases("sound.yaml")
+    assert case.machine.reciprocating_mass_kg == pytest.approx(16.0, rel=0.06)
+    assert case.body.mass_kg == pytest.approx(450.0, rel=0.06)
+    assert case.machine.speed_rpm == pytest.approx(500.0, abs=0.05)
+    assert case.sensor.noise_m_per_s2 == 0.001
+    comments = [line for line in text.splitlines() if line.startswith("#")]
+    assert any("95 % interval" in line and "body.mass_kg" in line for line in comments)
+
+
+def test_a_case_without_a_sensor_and_the_speed_are_refused(fitted, monkeypatch, compsim):
+    place, words, _ = fitted
+    monkeypatch.chdir(place)
+    err = compsim(*words, "--fit", "machine.speed_rpm=400:500", code=2).err
+    assert "machine.speed_rpm is the record's own" in err
+    err = compsim(*words, "--set", "sensor.low_pass_Hz=1", code=2).err
+    assert "its sensor's band holds no order of" in err
+    Path("bare.yaml").write_text('{"load": "gas", "gas": {"switching": "exact"}}')
+    again = ["bare.yaml" if word == "machine.yaml" else word for word in words]
+    assert "body and sensor" in compsim(*again[:5], *again[7:], code=2).err
