@@ -243,20 +243,6 @@ def _rod_forces(scene):
     return (*big, *small)
 
 
-def _ideal_forces():
-    """Forces on the rod (big x, y, small x, y) in the ideal mechanism, by inverse dynamics."""
-    big, small, along = sympy.Matrix([FBX, FBY]), sympy.Matrix([FSX, FSY]), _along(PHI_IDEAL)
-    newton = M_ROD * (CRANKPIN + A * along).diff(T, 2) - WEIGHT - big - small
-    crosshead = M_CROSS * X_IDEAL.diff(T, 2) + FSX + F_P
-    moment = sum(
-        arm * (along[0] * force[1] - along[1] * force[0])
-        for arm, force in ((-A, big), (L - A, small))
-    )
-    unknowns = [FBX, FBY, FSX, FSY]
-    solved = sympy.solve([*newton, crosshead, -I_ROD * PHI_IDEAL.diff(T, 2) - moment], unknowns)
-    return tuple(solved[name] for name in unknowns)
-
-
 @lru_cache
 def _functions(scene, backend):
     """The compiled (kinematics, accelerations, rod forces) of a scene for one backend."""
@@ -270,14 +256,10 @@ def _functions(scene, backend):
 
 
 @lru_cache
-def _ideal_functions(backend):
-    """The compiled ideal motion (x, x', x'', phi, phi', phi'') and joint forces."""
+def _ideal_functions():
+    """The compiled ideal motion (x, x', x'', phi, phi', phi'')."""
     motion = tuple(e.diff(T, k) if k else e for e in (X_IDEAL, PHI_IDEAL) for k in range(3))
-    names = (T, *CONSTANTS)
-    return (
-        sympy.lambdify(names, motion, backend, cse=True),
-        sympy.lambdify((*names, F_P), _ideal_forces(), backend, cse=True),
-    )
+    return sympy.lambdify((T, *CONSTANTS), motion, "math", cse=True)
 
 
 def _machine(p):
@@ -317,7 +299,7 @@ def _numbers(values, backend):
 
 def _ideal_motion(t, params):
     """(x, x', x'', phi, phi', phi'') of the mechanism without clearance at the time t [s]."""
-    return _ideal_functions("math")[0](t, *_machine(_record(params, "math")))
+    return _ideal_functions()(t, *_machine(_record(params, "math")))
 
 
 def _evaluate(scene, q, qd, t, phase, params, backend):
