@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py tally.py steppers.py) \
   tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-oldest test-pure check format calibration accuracy validation claims page sweep-bench peers tradeoff chaotic identify nameplate stress chaos mutants measurements pages docs release lock clean
+.PHONY: help install run figures test test-bare test-oldest test-pure check format calibration accuracy validation page sweep-bench peers tradeoff identify nameplate stress chaos mutants measurements pages docs release lock clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -56,9 +56,6 @@ calibration: install  ## measure what estimates of errors are worth, on cases th
 accuracy: install  ## judge promises and error bars on 1,000 other random cases (7 minutes)
 	$(CAMPAIGN)/measure_accuracy.py tests/results/accuracy.json
 
-claims: install  ## measure the paper's claims over machines, and what decides them (an hour, 5 GB)
-	$(CAMPAIGN)/measure_claims.py tests/results/claims.json
-
 page: install  ## test the report's page in a browser, measure how it is written and opens (ten minutes)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check selenium
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps axe-playwright-python
@@ -81,9 +78,6 @@ peers: install  ## time other tools and ours in turn on one problem (about six m
 tradeoff: install  ## measure speed against accuracy, and what the model's features do (ten minutes)
 	$(CAMPAIGN)/measure_tradeoff.py tests/results/tradeoff.json
 
-chaotic: install  ## compare averages of chaotic motions by two integrators (ten minutes)
-	$(CAMPAIGN)/measure_chaotic.py tests/results/chaotic.json
-
 identify: install  ## measure what is identified of other machines, and under another friction law (15 minutes)
 	$(CAMPAIGN)/measure_identify.py tests/results/identify.json
 
@@ -99,7 +93,7 @@ nameplate: install  ## run the case file of compsim init machine, for its page (
 mutants: install  ## plant bugs and see whether the fast tests catch them (half an hour)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-measurements: test-oldest calibration accuracy validation claims page tradeoff chaotic identify nameplate sweep-bench peers pages  ## all of these (about three hours)
+measurements: test-oldest calibration accuracy validation page tradeoff identify nameplate sweep-bench peers pages  ## all of these (about three hours)
 
 pages: install  ## write the pages' generated tables, compressor/API.md
 	$(BIN)/python tests/page_tables.py

@@ -33,7 +33,7 @@ def milliseconds(seconds):
     return f"{1e3 * seconds:.3g} ms" if seconds < 0.9995 else f"{1e3 * seconds:.0f} ms"
 
 
-# ---- the ten findings: words, and of a campaign's numbers (measured, required, whether it passes)
+# ---- the findings: words, and of a campaign's numbers (measured, required, whether it passes)
 
 KEPT_PROMISES, WITHIN_BARS = 0.99, 0.95  # required; what the error bars are designed for
 
@@ -83,11 +83,6 @@ def judge_extremes(found):
             "the others stop with a reason)"), "none", not wrong  # fmt: skip
 
 
-def count_averages(found):
-    row = found["random"]
-    return f"{row['within']['2']} of {row['judged']}", "about 95", None
-
-
 def judge_faults(found):
     rows = [row for row in found["campaigns"].values() if "skipped" not in row]
     failed, trials = (sum(row[name] for row in rows) for name in ("failed", "trials"))
@@ -98,13 +93,6 @@ def judge_mutants(found):
     rows = [row for row in found["mutants"] if "equivalent" not in row]
     caught = sum(bool(row["caught_by"]) for row in rows)
     return f"{caught} of {len(rows)}", "all", caught == len(rows)
-
-
-def count_claims(found):
-    margins, plane = found["default"]["margin"], found["map"]
-    held = sum(margin >= 0.0 for margin in margins)
-    return (f"{held} of {len(margins)} at the default masses; all {len(margins)} in {plane['all']} "
-            f"of {plane['judged']:,} machines with other masses"), "", None  # fmt: skip
 
 
 def count_identified(found):
@@ -119,11 +107,8 @@ FINDINGS = (
     ("accuracy", "Runs that are reported as accurate are accurate", judge_promises),
     ("accuracy", "True errors lie within their error bars", judge_bars),
     ("stress", "Extreme cases that are wrong without a warning", judge_extremes),
-    ("chaotic", "Averages of chaotic motions agree between two integrators, within two standard "
-                "errors", count_averages),
     ("chaos", "Kills, power cuts and damaged files that lose or change a result", judge_faults),
     ("mutants", "Planted bugs are caught by the tests", judge_mutants),
-    ("claims", "Claims of the paper that hold", count_claims),
     ("identify", "`compsim identify` names the worn joint", count_identified),
 )  # fmt: skip
 
@@ -314,7 +299,6 @@ PAGES = {  # page -> its generated blocks by name
     "compressor/docs/diagnosis.md": {"identify-words": lambda: state("identify")},
     "compressor/docs/my-machine.md": {"nameplate": nameplate_table, "decides": deciding_table},
     "compressor/docs/speed-or-accuracy.md": {"choose": choose_table},
-    "compressor/docs/the-paper.md": {"paper": lambda: state("claims")},
 }
 
 if __name__ == "__main__":

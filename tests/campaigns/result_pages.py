@@ -165,31 +165,6 @@ def calibration(found):
     return table(found["series"], columns | {"factor in the program": "share:.2g"})
 
 
-def claims(found):
-    def margin(of, place):
-        value, error = found[of]["margin"][place], found[of]["error"][place]
-        return f"{100 * value:+.3g} ± {100 * error:.2g}"
-
-    def machines(of, place):
-        return f"{found[of]['each'][str(place + 1)]} of {found[of]['judged']}"
-
-    return table([*enumerate(found["statements"])], {
-        "claim": lambda row: f"{row[0] + 1}. {row[1]}",
-        "default masses, %": lambda row: margin("default", row[0]),
-        "`agreeing`, %": lambda row: margin("agreeing", row[0]),
-        "holds in the map": lambda row: machines("map", row[0]),
-        "under random assumptions": lambda row: machines("assumptions", row[0]),
-        "decided most by": lambda row: deciding(found["assumptions"], row[0]),
-    })  # fmt: skip
-
-
-def deciding(drawn, place):
-    """Return the parameter with the largest total effect on a claim, and the effect."""
-    total = [value if value == value else -1.0 for value in drawn["total_order"][place]]
-    best = total.index(max(total))
-    return "–" if total[best] < 0.0 else f"{drawn['names'][best]}, {total[best]:.2f}"
-
-
 def validation(found):
     subjects = [[*group] for _, group in groupby(found["rows"], lambda row: row["subject"])]
     return table(subjects, {
@@ -273,22 +248,6 @@ def sweep(found):
     return listed(start | numbers | peaks | kills)
 
 
-def chaotic(found):
-    row = found["random"]
-    numbers = {
-        "random cases": row["drawn"], "reported as chaotic": row["regimes"]["chaotic"],
-        f"chaotic cases solved again by {row['method']}": row["judged"],
-        **{f"their rms differs by at most {k} standard errors": n
-           for k, n in row["within"].items()},
-        **{f"{name}: median, 90 %, largest": ", ".join(f"{value:.2g}" for value in row[of])
-           for name, of in (("relative standard error of the rms", "known"),
-                            ("relative difference of the rms", "relative"),
-                            ("horizon in revolutions", "horizon_rev"),
-                            ("revolutions needed for an rms within 1 %", "more"))},
-    }  # fmt: skip
-    return listed(numbers)
-
-
 def share(row):
     """Return a fraction with its 95 % interval."""
     return f"{row['share']:.1%} [{row['low']:.0%}, {row['high']:.0%}]" if row["of"] else "–"
@@ -348,8 +307,6 @@ CAMPAIGNS = {
     "calibration": ("How is the error estimated?", calibration),
     "tradeoff": ("Which method is fastest, and what does a feature of the model change?", tradeoff),
     "stress": ("What happens in extreme cases?", stress),
-    "chaotic": ("Can averages of chaotic motion be trusted?", chaotic),
-    "claims": ("Which of the paper's claims hold?", claims),
     "identify": ("Does `compsim identify` find the worn joint?", identify),
     "chaos": ("Do results survive kills, power cuts and damage?", chaos),
     "mutants": ("Would the tests notice a bug?", mutants),
@@ -364,7 +321,7 @@ VERDICTS = {None: "number", True: "pass", False: "**fail**"}
 
 
 def findings(read=kept):
-    """Yield the rows of the ten findings; `read` returns the numbers of a campaign."""
+    """Yield the rows of the findings; `read` returns the numbers of a campaign."""
     for name, words, find in FINDINGS:
         measured, required, passed = find(read(f"{name}.json"))
         yield [f"[{words}]({name}.md)", measured, required or "–", VERDICTS[passed]]
@@ -401,7 +358,7 @@ def write_page(name):
 
 
 def write_lists():
-    """Write the ten findings and the list of campaigns."""
+    """Write the findings and the list of campaigns."""
     rows = []
     for name, (question, _) in CAMPAIGNS.items():
         title = (RESULTS / f"{name}.md").read_text(encoding="utf-8").split("\n")[0].strip("# ")

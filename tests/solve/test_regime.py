@@ -66,6 +66,19 @@ def test_single_peaks_of_chaos_have_no_digits_and_averages_do(chaotic):
     assert low < high <= chaotic.numbers["peak_acceleration"]
 
 
+def test_averages_of_chaos_are_those_of_an_implicit_method():
+    """Beyond the horizon the two solutions have nothing else in common."""
+    values = {"joint": "both", "clearance_mm": 0.2, "contact": {"damping_N_s_per_mm": 0.336}}
+    long = {"duration_rev": 24, "settle_rev": 4, "output_step_deg": 3.6}
+    ours = measure(case(values, **long))
+    other = measure(case(values, **long, method="RODAS", rtol=1e-5, error_bars=False))
+    assert ours.attributes["regime"] == "chaotic"
+    rms, error = (ours.numbers[f"rms_acceleration{of}"] for of in ("", "_standard_error"))
+    scatter = math.sqrt(2.0) * error  # of both runs
+    assert abs(rms - other.numbers["rms_acceleration"]) < 4.0 * scatter
+    assert 0.0 < error < 0.1 * rms
+
+
 def test_accuracy_by_number_is_kept_by_averages_of_chaos_alone():
     """Of a single peak no number can be promised; of an average, what its bar allows."""
     met = measure(case(CHAOTIC, accuracy={"rms_acceleration": 0.4}, duration_rev=14))
