@@ -16,10 +16,6 @@ from compressor.studies.follow import lyapunov
 LIGHT = {"joint": "big_end", "clearance_mm": 0.2, "contact": {"damping_N_s_per_mm": 0.336}}
 
 
-def case(values):
-    return Case.from_values(values)
-
-
 def at_rest(made):
     y = np.zeros(2 * FREEDOMS[scene(made)])
     start(offsets(made), y, record(made))
@@ -70,9 +66,7 @@ def test_a_linear_oscillator_has_its_slowest_decay(damping, expected):
 
 @pytest.mark.parametrize("factor", [1e-9, 0.0])
 def test_a_difference_that_errors_swallow_gives_a_bound(factor):
-    found = lyapunov.growths(
-        lambda difference: factor * difference[np.newaxis], np.array([1e-7]), 5
-    )
+    found = lyapunov.growths(lambda push: factor * push[np.newaxis], np.array([1e-7]), 5)
     assert all(one.lost for one in found)
     assert rates(found) == pytest.approx(math.log(lyapunov.LOST_DISTANCE / 1e-7))
 
@@ -86,7 +80,7 @@ def test_errors_hold_as_often_as_they_say():
 @pytest.mark.parametrize("joint", ["big_end", "small_end"])
 def test_of_a_periodic_motion_it_is_the_largest_floquet_multiplier(joint):
     """By central differences of separate runs over one revolution, each with its own steps."""
-    made = case({"joint": joint, "clearance_mm": 0.2})
+    made = Case.from_values({"joint": joint, "clearance_mm": 0.2})
     y, size = settled(made), natural_sizes(record(made))
     ends = [
         [settled(made, 1, 1e-12, y + way * 1e-4 * size * unit) for unit in np.eye(y.size)]
@@ -103,7 +97,7 @@ def test_of_a_periodic_motion_it_is_the_largest_floquet_multiplier(joint):
 
 
 def test_of_a_chaotic_motion_it_is_the_rate_at_which_motions_part():
-    made = case(LIGHT)
+    made = Case.from_values(LIGHT)
     found = lyapunov.largest_exponent(made, settled(made, 4, 1e-8), 12, math.inf)
     rate = math.log(PARTED_DISTANCE / SHIFT) / (predictability_horizon(made) / made.turn)
     assert found.value - found.error > 0.0
@@ -113,6 +107,6 @@ def test_of_a_chaotic_motion_it_is_the_rate_at_which_motions_part():
 def test_explicit_steps_that_stability_holds_do_not_part_motions():
     """Of a motion with heavy damping, by the shifted run's own steps."""
     heavy = {"damping_N_s_per_mm": 336e2}
-    made = case({"joint": "small_end", "clearance_mm": 0.2, "contact": heavy})
+    made = Case.from_values({"joint": "small_end", "clearance_mm": 0.2, "contact": heavy})
     found = lyapunov.largest_exponent(made, settled(made, 4, 1e-6), 4, math.inf)
     assert -1.1 < found.value < -0.8

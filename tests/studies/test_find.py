@@ -1,11 +1,22 @@
-"""Searches on functions with a known threshold or maximum, with bars, failures and jumps."""
+"""Searches on functions whose answer is known, and `compsim find` confirmed by direct runs."""
 
+import contextlib
+import io
+import json
 import math
+import re
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
+from compsim import cli
+from conftest import jobs_here
 
+from compressor.cases import Case, load_studies
 from compressor.outcome import ROW
+from compressor.solve.simulate import simulate
+from compressor.store import read_store, read_studies
 from compressor.studies import find
 from compressor.studies.frame import StudyError
 
@@ -112,9 +123,8 @@ def test_the_highest_of_two_peaks_counts():
     def function(x):
         return math.exp(-(((x - 0.2) / 0.1) ** 2)) + 1.1 * math.exp(-(((x - 0.77) / 0.1) ** 2))
 
-    assert find.find_extremum(jobs(function), True, SCAN, 1e-4).best.share == pytest.approx(
-        0.77, abs=1e-3
-    )
+    found = find.find_extremum(jobs(function), True, SCAN, 1e-4)
+    assert found.best.share == pytest.approx(0.77, abs=1e-3)
 
 
 def test_points_whose_bars_reach_the_best_are_as_good():
@@ -128,9 +138,8 @@ def test_points_whose_bars_reach_the_best_are_as_good():
 
 
 def test_an_extremum_goes_around_failures_and_tells_of_them():
-    found = find.find_extremum(
-        jobs(lambda x: None if 0.35 < x < 0.45 else -((x - 0.4) ** 2)), True, SCAN, 1e-3
-    )
+    evaluate = jobs(lambda x: None if 0.35 < x < 0.45 else -((x - 0.4) ** 2))
+    found = find.find_extremum(evaluate, True, SCAN, 1e-3)
     assert found.kind == "undecided"
     assert 0.45 <= found.best.share < 0.47
     assert found.low.share == 0.25
@@ -166,22 +175,22 @@ def test_a_chaotic_peak_is_the_mean_of_revolutions():
         peak_acceleration=900.0, peak_acceleration_error=np.inf, peak_acceleration_mean=700.0,
         peak_acceleration_mean_standard_error=10.0, revolutions=31,
     )  # fmt: skip
-    told = find.goal_of("peak_acceleration", "greatest").read(row, "chaotic")
+    goal = find.goal_of("peak_acceleration", "greatest")
+    told = goal.read(row, "chaotic")
     assert (told.value, told.averaged, told.reason) == (700.0, True, "")
     assert told.bar == pytest.approx(21.448, abs=1e-3)
     row["peak_acceleration_mean_standard_error"] = np.inf
-    assert (
-        "too few revolutions" in find.goal_of("peak_acceleration", ">").read(row, "chaotic").reason
-    )
+    assert "too few revolutions" in goal.read(row, "chaotic").reason
 
 
 @pytest.mark.parametrize(
     ("sign", "there"), [(">", False), (">=", True), ("<", False), ("<=", True)]
 )
 def test_a_limit_without_a_bar_is_decided(sign, there):
-    assert find.Goal("peak_acceleration", (), sign, 5.0).holds(find.JobReading(5.0, 0.0)) is there
-    assert find.Goal("peak_acceleration", (), sign, 5.0).holds(find.JobReading(5.0, 1e-9)) is None
-    assert find.Goal("peak_acceleration", (), sign, 5.0).holds(FAILED) is None
+    goal = find.Goal("peak_acceleration", (), sign, 5.0)
+    assert goal.holds(find.JobReading(5.0, 0.0)) is there
+    assert goal.holds(find.JobReading(5.0, 1e-9)) is None
+    assert goal.holds(FAILED) is None
 
 
 @pytest.mark.parametrize(
@@ -199,6 +208,105 @@ def test_a_limit_without_a_bar_is_decided(sign, there):
     ],
 )
 def test_what_is_no_comparison_is_refused(text, told):
-    with pytest.raises(StudyError) as refusal:
+    with pytest.raises(StudyError, match=re.escape(told)):
         find.comparison(text)
-    assert told in str(refusal.value)
+
+
+# ---- the command
+
+
+LIMIT = 0.006
+ASKED = [
+    "find", "worn.yaml", "--over", "clearance_mm=0.002:0.2", "--log", "--scan", "5",
+    "--tolerance", "0.04", "--first", f"contact_loss_fraction.small_end > {LIMIT}", "-j", "2",
+]  # fmt: skip
+CASE = {
+    "joint": "small_end",
+    "clearance_mm": 0.1,
+    "contact": {"damping_N_s_per_mm": 20},
+    "solve": {"duration_rev": 1, "settle_rev": 0.25, "accuracy": "draft"},
+}
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    place = tmp_path_factory.mktemp("find")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(place)
+        Path("worn.yaml").write_text(json.dumps(CASE))
+        with jobs_here(), contextlib.redirect_stdout(io.StringIO()) as out:
+            assert cli.main([*ASKED, "--json", "--quiet"]) == 0
+    return place, json.loads(out.getvalue())
+
+
+@pytest.fixture
+def folder(found, tmp_path, monkeypatch, in_process):
+    shutil.copytree(found[0], tmp_path / "copy")
+    monkeypatch.chdir(tmp_path / "copy")
+
+
+def direct(clearance, accuracy, metric="contact_loss_fraction"):
+    """A metric at the small end of a run of the case alone, outside of any store."""
+    solve = CASE["solve"] | {"accuracy": accuracy}
+    case = Case.from_values(CASE | {"clearance_mm": clearance, "solve": solve})
+    return float(simulate(case)[metric].sel(joint="small_end"))
+
+
+@pytest.mark.parametrize("accuracy", ["draft", "standard"])
+def test_direct_runs_on_both_sides_confirm_the_interval(accuracy, found, folder):
+    answer = found[1]
+    assert answer["kind"] == "found"
+    low, high = answer["low"], answer["high"]
+    assert 1.0 < high["argument"] / low["argument"] <= 100**0.04 * (1 + 1e-6)
+    assert direct(low["argument"], accuracy) <= LIMIT < direct(high["argument"], accuracy)
+    for end in (low, high):
+        difference = abs(direct(end["argument"], accuracy) - end["reading"]["value"])
+        # two runs of other tolerances, each with its bar, of which one in 30 does not hold
+        assert difference <= end["reading"]["bar"] * (3 if accuracy == "standard" else 1e-6)
+
+
+def test_an_answer_is_said_in_plant_units(found, folder, compsim):
+    asked = [*ASKED[:-4], "--first", "peak_contact_force.small_end > 5.5 kN", "-j", "2"]
+    out = compsim(*asked, "--quiet", "--units", "plant").out
+    assert out.startswith("peak_contact_force.small_end > 5.5 kN: ")
+    first = float(re.search(r"^ +0\.002 +(\S+) ± ", out, re.MULTILINE)[1])
+    assert first == pytest.approx(direct(0.002, "draft", "peak_contact_force") / 1e3, rel=1e-4)
+
+
+def test_a_second_search_computes_nothing(found, folder, compsim):
+    keys = read_store("results").keys()
+    assert found[1]["run_now"] == len(found[1]["points"]) == len(keys)
+    out, err = compsim(*ASKED, "--quiet")
+    low, high = (f"{found[1][end]['argument']:.9g}" for end in ("low", "high"))
+    head, *said, _ = (line.split(maxsplit=1) for line in out.splitlines()[:5])
+    assert " ".join(head) == f"contact_loss_fraction.small_end > {LIMIT}: found"
+    assert dict(said)["between"] == f"{low} and {high}"
+    assert dict(said)["jobs"].startswith(f"{len(keys)}, 0 of them run now, in study worn-find-")
+    rows = {line.split()[0]: line.split() for line in out.splitlines()[5:]}
+    assert [*rows] == [f"{point['argument']:.9g}" for point in found[1]["points"]]
+    assert (rows[low][-2], rows[high][-2]) == ("no", "yes")
+    value, bar = float(rows[low][1]), float(rows[low][3])
+    assert value == pytest.approx(found[1]["low"]["reading"]["value"], abs=bar)
+    assert read_store("results").keys() == keys
+    assert err == ""
+
+
+def test_the_store_is_one_study_that_status_and_run_understand(found, folder, compsim):
+    (study,) = read_studies("results")
+    points = found[1]["points"]
+    assert study.axes[0].values == tuple(point["argument"] for point in points)
+    assert study.keys == tuple(point["key"] for point in points)
+    assert study.is_trial  # a report puts it behind studies of a run
+    assert f"{len(points)} ok" in compsim("status").out
+    compsim("verify")
+    again = study.again
+    (same,) = load_studies(again.case_file, overrides=again.overrides)
+    assert same.keys == study.keys
+
+
+def test_failed_jobs_are_no_answer(folder, compsim):
+    ask = ["find", "worn.yaml", "--over", "clearance_mm=0.01:0.02", "--scan", "3", "--quiet",
+           "--first", "peak_acceleration > 1", "--set", "solve.max_steps=5"]  # fmt: skip
+    out = compsim(*ask, code=3).out
+    assert re.match(r"peak_acceleration > 1 m/s2: unclear\n", out)
+    assert out.count("the job failed, budget_steps: more than 5 steps  failed  ") == 3
