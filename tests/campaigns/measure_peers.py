@@ -7,7 +7,7 @@ starts from the problem's numbers and ends with the crosshead's acceleration on 
 0.1 ms; ours is the whole
 `simulate(case)`, with all its series, metrics and energy balance, the kernel's own seconds beside
 it. Errors are against the reference of reference.py. What is not installed, or fails, is a
-row with its reason. At last one evaluation of the equations is timed (peers/evaluation.py).
+row with its reason.
 """
 
 import os
@@ -21,7 +21,7 @@ from statistics import median
 from typing import NamedTuple
 
 import reference
-from peers import evaluation, multibody, notebook, soda
+from peers import multibody, notebook, soda
 from peers.mechanism import DURATION, SCENES, case_values, error, loosest, output_grid, params
 from result_pages import keep, provenance, run_campaign
 
@@ -179,8 +179,7 @@ def main(target):
     rows.sort(key=lambda row: (order.index(row["tool"]), SCENES.index(row["scene"])))
     kept = provenance("make peers")
     kept["versions"] |= versions()
-    timed_alone = {"scenes": [evaluation.beside_transcription(scene) for scene in SCENES]}
-    kept |= {"rounds": ROUNDS, "agreement": checks, "rows": rows, "evaluations": timed_alone}
+    kept |= {"rounds": ROUNDS, "agreement": checks, "rows": rows}
     keep(target, kept, 3)
 
 
