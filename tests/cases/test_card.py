@@ -116,10 +116,6 @@ def test_the_key_has_the_numbers_and_not_the_place(tmp_path, card):
     [
         ({"action": "double", "rod_diameter_mm": 30}, "gas.indicator.crank: is needed with action"),
         ({"action": "crank_end", "rod_diameter_mm": 30}, "gas.indicator: nothing reads"),
-        (
-            {"action": "double", "indicator": {"crank": "head.csv"}},
-            "gas.rod_diameter_mm: is needed",
-        ),
         ({"indicator": 5}, "gas.indicator: needs the path of a CSV file with columns"),
     ],
 )

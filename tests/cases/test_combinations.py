@@ -5,10 +5,8 @@ import json
 import random
 import re
 
-import pytest
-
 from compressor.cases.case import Case
-from compressor.cases.checks import row_of, value_of
+from compressor.cases.checks import row_of
 from compressor.cases.conflicts import reads
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.parameter import CaseError
@@ -106,28 +104,3 @@ def test_random_sweeps_are_what_their_jobs_are(tmp_path):
             planned += 1
     assert planned >= 20
     assert conflicts >= 20
-
-
-TOGETHER = """
-joint: [big_end, both]
-clearance_mm: {random: [0.05, 0.4]}
-machine: {rod_length_mm: {random: [400, 800]}, speed_rpm: {random: [300, 900]}}
-contact: {exponent: [1.5, 2.0]}
-sample: {n: 40, seed: 2}
-exclude: [machine.speed_rpm > 700 and clearance_mm < 0.2, clearance_mm.small_end > 0.35]
-"""
-BLOCKS = """
-blocks:
-- {joint: big_end, clearance_mm: [0.1, 0.2], friction: false}
-- {joint: both, clearance_mm: {big_end: [0.1, 0.2], small_end: 0.1}, load: [none, gas]}
-- {joint: none, machine: {speed_rpm: {range: [300, 600, 100]}}}
-"""
-
-
-@pytest.mark.parametrize("text", [TOGETHER, BLOCKS])
-def test_designs_and_blocks_are_what_their_jobs_are(text, tmp_path):
-    path = tmp_path / "case.yaml"
-    path.write_text(text)
-    (study,) = load_studies(path)
-    for axis in study.axes:
-        assert list(axis.values) == [value_of(case, axis.key) for case in study.cases]

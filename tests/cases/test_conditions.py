@@ -1,11 +1,10 @@
-"""Comparisons select jobs: what they mean, against Python's own, and what is refused."""
+"""Comparisons select jobs: what they mean, and what is refused."""
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from compressor.cases.comparison import MAX_LENGTH, NoComparison, comparison
-from compressor.cases.table import table
 
 JOB = {
     "clearance_mm": 0.2,
@@ -33,6 +32,14 @@ SIGNS = ("==", "!=", "<", "<=", ">", ">=")
         ("machine.speed_rpm == 0x1F4", True), ("clearance_mm > -.5", True),
         ("\n load\t==\n design\x1f", True), ("(load) == (design)", True),
         ("clearance_mm>0.1or load==none", True), ("solve.error_bars != False", True),
+        ("machine.speed_rpm <= 500", True), ("machine.speed_rpm < 500", False),
+        ("machine.speed_rpm != 500", False), ("clearance_mm > -3e5", True),
+        # not binds before and, and before or
+        ("load == none and load == gas or clearance_mm < 1", True),
+        ("clearance_mm < 1 or load == none and load == gas", True),
+        ("(clearance_mm < 1 or load == none) and load == gas", False),
+        ("not load == none and load == gas", False),
+        ("not (load == none and load == gas)", True),
     ],
 )  # fmt: skip
 def test_a_comparison_holds_or_not(text, holds):
@@ -59,33 +66,6 @@ def test_what_is_no_comparison_is_told(text, message):
     with pytest.raises(NoComparison) as error:
         comparison(text)
     assert str(error.value) == message
-
-
-compared = st.builds(
-    "{} {} {}".format, st.sampled_from(NUMBERS), st.sampled_from(SIGNS),
-    st.sampled_from([0.1, 0.2, 500, -3e5]),
-) | st.builds(
-    "{} {} {}".format, st.just("load"), st.sampled_from(["==", "!="]),
-    st.sampled_from(table()["load"].choices),
-)  # fmt: skip
-expressions = st.recursive(
-    compared,
-    lambda inner: (
-        st.builds("{} and {}".format, inner, inner)
-        | st.builds("{} or {}".format, inner, inner)
-        | st.builds("not {}".format, inner)
-        | st.builds("({})".format, inner)
-    ),
-    max_leaves=12,
-)
-
-
-@given(expressions)
-def test_comparisons_mean_what_they_mean_in_python(text):
-    names = {"clearance_mm": 0.2, "speed": 500.0, "load": "spring"}
-    names |= {word: word for word in table()["load"].choices}
-    meant = eval(text.replace("machine.speed_rpm", "speed"), {"__builtins__": {}}, names)
-    assert comparison(text)(JOB.get) is meant
 
 
 WORDS = [

@@ -1,5 +1,6 @@
 """Keys of random cases, and jobs, axes and keys of our case files: equal until the model changes.
 
+And the examples that are installed with the program: they say what they have, and run.
 `python tests/cases/test_frozen.py` writes frozen.json anew for the same values and today's files.
 """
 
@@ -10,9 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from compressor.analysis.cautions import cautions
 from compressor.cases.case import Case
-from compressor.cases.examples import templates
+from compressor.cases.examples import STARTS, templates
 from compressor.cases.load import load_studies
+from compressor.solve.simulate import simulate
 
 ROOT = Path(__file__).parents[2]
 KEPT = Path(__file__).with_name("frozen.json")
@@ -46,6 +49,17 @@ def test_examples_have_the_jobs_that_they_say():
         (said,) = re.findall(r"^([\d,]+) (?:jobs|machines?)\b", one.jobs)
         kept = FROZEN["files"][f"{name}.yaml"]
         assert (kept["name"], kept["jobs"]) == (name, int(said.replace(",", "")))
+
+
+@pytest.mark.parametrize("name", STARTS)
+def test_templates_run_without_a_warning(name):
+    """Two jobs of each, short ones: the axes' ends."""
+    (study,) = load_studies(templates()[name].path, overrides=["solve.accuracy=draft"])
+    assert cautions(study) == []
+    for case in (study.cases[0], study.cases[-1]):
+        run = simulate(case)
+        assert run["status"].item() == "ok"
+        assert run["peak_acceleration"] > 0
 
 
 def write_kept():

@@ -52,9 +52,6 @@ def test_plain_scalars_follow_yaml_1_2(text, value):
     assert type(resolve_scalar(text)) is type(value)
 
 
-# What a file means
-
-
 @pytest.mark.parametrize(
     ("text", "values"),
     [
@@ -81,9 +78,6 @@ def test_a_title_and_notes_are_no_part_of_a_job(write):
     assert other.title == "Unit 4"
 
 
-# Mistakes
-
-
 def test_mistakes_of_all_files_are_told_at_once(write):
     paths = [write("load: x\n", "b.yaml"), "\x1b[31m.yaml", write("\n- 1\n", "a.yaml")]
     assert mistakes(*paths, overrides=["joint=y"]) == [
@@ -108,9 +102,6 @@ def test_a_sweep_full_of_conflicts_is_cut_short(write):
     assert len(found) == 21
 
 
-# Overrides
-
-
 @pytest.mark.parametrize(
     ("text", "overrides", "same_as"),
     [
@@ -121,6 +112,8 @@ def test_a_sweep_full_of_conflicts_is_cut_short(write):
         (BIG_END, ["clearance_mm=[0.2, 0.3]"], "joint: big_end\nclearance_mm: [0.2, 0.3]"),
         ("joint: both\nclearance_mm: [1, 2]", ["clearance_mm.big_end=3"],
          "joint: both\nclearance_mm: {big_end: 3, small_end: [1, 2]}"),
+        (BIG_END, ["machine.pin_radius_mm.big_end=60", "machine.pin_radius_mm.small_end=90"],
+         BIG_END + "machine: {pin_radius_mm: {big_end: 60, small_end: 90}}"),
         (BIG_END, ["joint=[none, both]"], "joint: [none, both]\nclearance_mm: 0.1"),
         (BIG_END + "friction: {static: 0.3}", ["friction=false"], BIG_END + "friction: false"),
         (BIG_END + "friction: false", ["friction.static=0.3"],
@@ -161,9 +154,6 @@ def test_what_an_override_breaks_is_told_where_the_file_could_mend_it(write):
     assert message.startswith("case.yaml:2:18: gas.switching: the printed corners hold for")
 
 
-# Hostile files
-
-
 def hostile(unit: str, before: str = "", after: str = "") -> str:
     return before + unit * ((MAX_BYTES - len(before + after)) // len(unit)) + after
 
@@ -196,18 +186,27 @@ WORDS = "joint load none both clearance_mm machine rod_mass_kg friction false co
 SIGNS = "steel 0.1 -1 1e400 ~ null &a *a !t << ? : - [ ] { } , | > ' \" % # --- ... \\UFFFFFFFF"
 GAPS = [": ", "- ", "\n", "\n  ", "\t", " ", "%YAML 1.3\n"]
 YAMLISH = st.lists(st.sampled_from([*WORDS.split(), *SIGNS.split(), *GAPS]), max_size=40)
+SWEEPS = [
+    "clearance_mm: {linspace: [0.1, 0.3, 3]}", "clearance_mm: {random: [1, 2]}", "load: [none]",
+    "machine: {speed_rpm: {lhs: [300, 900], log: true}}", "sample: {n: 3}", "sample: {seed: 1}",
+    "zip: [[load, clearance_mm]]", "exclude: load == none", "exclude: [load == none]",
+    "blocks: [{load: none}, {joint: both, sample: {n: 2}}]", "joint: big_end", "zip: {}",
+    "blocks: [1]", "exclude: {load: none}", "sample: {n: [1, 2]}", "zip: [[[load]]]",
+]  # fmt: skip
+SWEPT = st.lists(st.sampled_from(SWEEPS), max_size=6, unique=True).map("\n".join)
 
 
 def problems(path: str, *overrides: str) -> list[FileProblem]:
     try:
-        load_studies(path, overrides=overrides)
+        (study,) = load_studies(path, overrides=overrides)
     except CaseFileError as error:
         return error.problems or pytest.fail("no problem is named")
+    assert len([*study.cases]) == study.jobs > 0
     return []
 
 
 @one_file
-@given(st.text() | st.binary() | YAMLISH.map("".join) | YAMLISH.map(" ".join))
+@given(st.text() | st.binary() | YAMLISH.map("".join) | YAMLISH.map(" ".join) | SWEPT)
 def test_any_file_is_read_or_refused(write, text):
     content = text.encode(errors="replace") if isinstance(text, str) else text
     for problem in problems(write(content)):

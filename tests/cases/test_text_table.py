@@ -32,8 +32,6 @@ def table(tmp_path):
         (GERMAN.replace(";", "\t"), "separator tab, decimal comma, header in line 1, 3 columns"),
         (POINTS.replace(";", ","), "separator comma, decimal point, header in line 1, 3 columns"),
         (POINTS.replace(";", ", "), "separator comma, decimal point, header in line 1, 3 columns"),
-        (GERMAN.encode("utf-8-sig"), "semicolon, decimal comma, header in line 1, 3 columns"),
-        (GERMAN.encode("utf-16"), "semicolon, decimal comma, header in line 1, 3 columns"),
         (GERMAN.replace("\n", ";\r\n"), "semicolon, decimal comma, header in line 1, 3 columns"),
         (
             GERMAN.replace("Time [ms];Acc [g];Keyphasor [V]", "Time;Acc;Keyphasor\nms;g;V"),
