@@ -8,6 +8,7 @@ import os
 import shutil
 import signal
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -163,6 +164,14 @@ def keep(folder, *datasets):
     """Store jobs as they are, whatever they hold, as a sweep would."""
     for dataset in datasets:
         write_batch(folder, [outcome_of(dataset)])
+
+
+def wait_for(condition, seconds=600.0):
+    """Wait until something holds, which may take long on a busy machine, or fail."""
+    deadline = time.monotonic() + seconds
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert condition()
 
 
 def flip(path, values):

@@ -9,11 +9,12 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from chaos.processes import members
 from compsim import screen
+from conftest import wait_for
 
 from compressor.cases import load
 from compressor.cases.load import load_cases
@@ -22,7 +23,6 @@ from compressor.store import reader as store
 from compressor.store.studies import read_studies
 
 SOLVE = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
-PATIENCE = 600  # s, until something happens: it may take a second, or the kernel is compiled
 
 
 @pytest.fixture
@@ -174,9 +174,6 @@ def test_durations_points_and_sizes(say, thing, text):
     assert say(thing) == text
 
 
-# ---- explain and tradeoff -----------------------------------------------------------------------
-
-
 def test_explain_tells_cost_and_what_is_paid_for(case_file, compsim):
     case_file(
         "two.yaml", joint="big_end", clearance_mm=[0.1, 0.2], machine={"gravity_m_per_s2": 1e-4}
@@ -224,9 +221,6 @@ def test_explain_models_prints_what_moves_metrics(case_file, compsim, monkeypatc
     assert re.search(r"^  \S+ [\d.]+ +[-+][\d.]+ %$", out, re.MULTILINE)
 
 
-# ---- signals ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("name", "code"), [("INT", 130), ("TERM", 143), ("HUP", 129)])
 def test_exit_codes_of_signals_but_of_those_ignored(name, code, case_file, compsim, monkeypatch):
     """They arrive while the case files are read."""
@@ -251,21 +245,6 @@ def test_exit_codes_of_signals_but_of_those_ignored(name, code, case_file, comps
 JOBS = 60  # more than are done when a run is told to end
 
 
-def is_running(group):
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
-def wait_for(condition):
-    deadline = time.monotonic() + PATIENCE
-    while not condition() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert condition()
-
-
 def test_a_run_that_is_told_to_end(tmp_path):
     """A real one, in its own process group, with at least one job done."""
     rods = [4 + number / 1000 for number in range(JOBS)]
@@ -279,9 +258,9 @@ def test_a_run_that_is_told_to_end(tmp_path):
     try:
         wait_for(lambda: run.poll() is not None or [*tmp_path.glob("results/batches/*.h5")])
         os.killpg(run.pid, signal.SIGINT)  # Ctrl-C reaches the whole group
-        err = run.communicate(timeout=PATIENCE)[1]
+        err = run.communicate(timeout=600)[1]
         assert run.returncode == 130
-        wait_for(lambda: not is_running(run.pid))
+        wait_for(lambda: not members(run.pid))
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(run.pid, signal.SIGKILL)

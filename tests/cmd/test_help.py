@@ -14,18 +14,11 @@ WIDTH = 78  # columns that click fills on a terminal of 80
 VERBS = sorted(cli.commands)
 
 
-def help_of(name=""):
-    """The lines of `compsim [NAME] --help` on a terminal of 80 columns."""
-    command = cli.commands[name] if name else cli
-    parent = click.Context(cli, info_name="compsim")
-    context = click.Context(command, parent if name else None, name or "compsim",
-                            terminal_width=WIDTH)  # fmt: skip
-    return command.get_help(context).splitlines()
-
-
 def examples(name):
     """The commands in a verb's help, each with its lines joined; some follow a shell's name."""
-    text = "\n".join(help_of(name)).partition("Options:")[0].replace("\\\n", " ")
+    parent = click.Context(cli, info_name="compsim")
+    context = click.Context(cli.commands[name], parent, name, terminal_width=WIDTH)
+    text = context.get_help().partition("Options:")[0].replace("\\\n", " ")
     return re.findall(rf"^ +(?:\w+  )?(compsim {name}\b.*)$", text, re.MULTILINE)
 
 

@@ -37,14 +37,3 @@ def test_files_and_folders_may_be_chosen(compsim):
     assert Path("deep/er/mine.yaml").read_text().splitlines()[2].startswith(
         "# next: compsim run deep/er/mine.yaml;"
     )  # fmt: skip
-
-
-def test_nothing_is_overwritten(compsim):
-    Path("wear.yaml").write_text("mine")
-    Path("link.yaml").symlink_to("absent")
-    for words in (["wear"], ["wear", "-o", "wear.yaml"], ["paper", "-o", "link.yaml"]):
-        err = compsim("init", *words, code=2).err
-        assert "exists, and is not overwritten: compsim init " in err
-        assert "-o OTHER.yaml" in err
-    assert Path("wear.yaml").read_text() == "mine"
-    assert not Path("absent").exists()

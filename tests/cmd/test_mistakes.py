@@ -55,6 +55,8 @@ MISTAKES = [
     ("init wear -o 'my wear.yaml'", "'my wear.yaml' gives the study no name"),
     ("init wear -o good.yaml/wear.yaml", "good.yaml: is a file, where a folder is needed"),
     ("init wear", "wear.yaml exists, and is not overwritten: compsim init wear -o OTHER.yaml"),
+    ("init wear -o good.yaml", "good.yaml exists, and is not overwritten: compsim init wear -o O"),
+    ("init paper -o link.yaml", "link.yaml exists, and is not overwritten: compsim init paper -o"),
     # folders of results
     ("status -r resluts", "resluts: there is no such folder of results; choose another"),
     ("plan wear.yaml --set joint=both --set joint=none", "--set joint=none: joint: is set twice"),
@@ -146,6 +148,7 @@ def morning(tmp_path_factory):
     (big_end,) = (path for path in CONFIGS if path.stem == "big-end")
     store(place / "results", place / "grid", big_end, overrides=["solve.accuracy=draft"])
     (place / "READONLY").mkdir()
+    (place / "link.yaml").symlink_to("absent")
     batch = next((place / "results" / "batches").iterdir())
     shutil.copy(batch, batch.with_name("BATCH.h5"))
     return place

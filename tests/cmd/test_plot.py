@@ -25,9 +25,6 @@ CASES = {
     "worn": {"joint": "big_end", "clearance_mm": [0.1, 0.3], "friction": False,
              "contact": {"damping_N_s_per_mm": 10},
              "machine": {"speed_rpm": [400, 500], "rod_mass_kg": 1}},
-    "listed": {"joint": "big_end", "clearance_mm": [0.2, 0.25],
-               "machine": {"speed_rpm": [450, 500]},
-               "zip": [["clearance_mm", "machine.speed_rpm"]]},
     "ideal": {"load": "gas"},
     "halted": {"joint": "big_end", "clearance_mm": 0.1, "solve": {"max_steps": 100}},
     "bare": {"joint": "big_end", "clearance_mm": 0.1, "output": {"keep": "metrics"}},
@@ -76,16 +73,19 @@ def job(folder, name, place=0):
     return read_store(folder).job(key(folder, name, place))
 
 
-def test_cards_are_of_the_gas(plot, folder, unpainted):
-    """Their power is the work that the piston force takes, over the time."""
+def test_ideal_joints_have_cards_and_no_contacts_to_draw(plot, folder, unpainted):
+    """The power of the gas is the work that the piston force takes, over the time."""
     mine = key(folder, "ideal")
-    code, found, err = plot(mine, "--what", "cards")
+    code, found, err = plot(mine)
     assert (code, err) == (0, "")
-    (caption,) = found.values()
-    assert plot("ideal", "--what", "cards")[:2] == (code, found)  # its one job is named by it
+    drawn = [name.rpartition("-")[2] for name in found]
+    assert drawn == ["analyst.png", "signals.png", "cards.png", "spectra.png"]
+    (cards,) = plot("ideal", "--what", "cards")[1].items()  # its one job is named by it
+    assert cards in found.items()
     power = -float(job(folder, "ideal")["load_work"]) / 0.36e3
-    said = float(re.search(r"Indicated power, head end: ([\d.]+) kW", caption)[1])
+    said = float(re.search(r"Indicated power, head end: ([\d.]+) kW", cards[1])[1])
     assert said == pytest.approx(power, rel=5e-3)
+    assert len(plot("ideal")[1]) == 2  # of the study
 
 
 def test_a_job_is_drawn_with_its_numbers(plot, folder, unpainted):
@@ -93,13 +93,10 @@ def test_a_job_is_drawn_with_its_numbers(plot, folder, unpainted):
     code, found, err = plot("worn", "clearance_mm=0.3", "machine.speed_rpm=500")
     assert (code, err) == (0, "")
     drawn = [name for name in FIGURES["job"] if name != "cards"]  # there is no gas
-    names = [f"plots/{mine[:10]}-{name}.png" for name in drawn]
-    assert [*found] == names
+    assert [*found] == [f"plots/{mine[:10]}-{name}.png" for name in drawn]
     run = job(folder, "worn", 3)
     analyst, signals, spectra, orbits, impacts = found.values()
-    assert "both combined, without clearance: " in signals
-    force = frame_forces(run)
-    last = slice(2 * 720, None)
+    force, last = frame_forces(run), slice(2 * 720, None)
     x = force["shaking_force"][last, 0] / 1e3
     assert f"along the cylinder: {spell(x.min())} to {spell(x.max())} kN" in signals
     assert f"Greatest acceleration: {spell(peak(run, last))} m/s²" in analyst
@@ -156,16 +153,6 @@ def test_a_damaged_job_is_a_row_without_series(folder, tmp_path, compsim, unpain
     damage_series(home, key(home, "worn", 2))
     told = " ".join(compsim(*words, code=2).err.split())
     assert f"can be drawn: damaged: compsim verify -r {home} names the file" in told
-
-
-def test_ideal_joints_have_no_contacts_to_draw(plot, folder, unpainted):
-    mine = key(folder, "ideal")
-    code, found, _ = plot(mine)
-    assert code == 0
-    drawn = [name.rpartition("-")[2] for name in found]
-    assert drawn == ["analyst.png", "signals.png", "cards.png", "spectra.png"]
-    code, found, _ = plot("ideal")
-    assert (code, len(found)) == (0, 2)
 
 
 @pytest.mark.parametrize(

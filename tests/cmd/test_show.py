@@ -3,7 +3,6 @@
 import json
 import math
 import re
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -21,12 +20,7 @@ HERE = ["big-end", "clearance_mm=0.2"]
 @pytest.fixture
 def show(compsim):
     """Runs `compsim show` and returns what it prints."""
-
-    def run(*words):
-        place = ["-r"] if isinstance(words[0], Path) else []
-        return compsim("show", *place, *words).out
-
-    return run
+    return lambda *words: compsim("show", *words).out
 
 
 def values(out):
@@ -39,14 +33,14 @@ def test_a_job_is_named_by_its_key_or_by_its_study_and_values(paper_store, show)
     found = report_job(paper_store, *HERE)
     assert found.studies == {"big-end": {"clearance_mm": 0.2}}
     assert json.loads(found.attributes["case"])["clearance_mm"]["big_end"] == 0.2
-    out = show(paper_store, *HERE)
+    out = show("-r", paper_store, *HERE)
     assert out.startswith(f"job {found.key}: ok\n  in big-end clearance_mm=0.2\n")
     assert show(found.key[:12], "-r", paper_store) == out
 
 
 def test_numbers_have_labels_units_and_error_bars(paper_store, show):
-    stored, told = report_job(paper_store, *HERE).numbers, values(show(paper_store, *HERE))
-    in_json = json.loads(show(paper_store, *HERE, "--json"))["numbers"]
+    stored, told = report_job(paper_store, *HERE).numbers, values(show("-r", paper_store, *HERE))
+    in_json = json.loads(show("-r", paper_store, *HERE, "--json"))["numbers"]
     assert in_json["peak_contact_force"] == pytest.approx(stored["peak_contact_force"], rel=1e-15)
     force, bar = (stored[name] for name in ("peak_contact_force", "peak_contact_force_error"))
     for place, joint in enumerate(("big end", "small end")):
@@ -68,7 +62,7 @@ def test_numbers_may_be_in_plant_units_or_si(paper_store, show):
     numbers = report_job(paper_store, *HERE).numbers
     peak, force = numbers["peak_acceleration"], numbers["peak_contact_force"][0]
     for units, acceleration, newtons in (("plant", "g", "kN"), ("si", "m/s²", "N")):
-        told = values(show(paper_store, *HERE, "--units", units))
+        told = values(show("-r", paper_store, *HERE, "--units", units))
         value, unit = re.fullmatch(r"(\S+) ± \S+ (\S+)", told["peak acceleration"]).groups()
         assert unit == acceleration
         in_unit = peak / 9.80665 if unit == "g" else peak
@@ -82,13 +76,13 @@ def test_numbers_may_be_in_plant_units_or_si(paper_store, show):
 
 def test_the_case_is_shown_so_that_it_makes_the_same_job(paper_store, show, tmp_path):
     key, path = report_job(paper_store, *HERE).key, tmp_path / "one.yaml"
-    changed = show(paper_store, *HERE).partition("(--case prints all)\n")[2].split()
+    changed = show("-r", paper_store, *HERE).partition("(--case prints all)\n")[2].split()
     assert "clearance_mm=0.2" in changed
     assert "speed_rpm" not in "".join(changed)  # the usual one
     path.write_text("load: none\n")
     (study,) = load_studies(path, overrides=["load=spring", *changed])
     assert [*study.keys] == [key]
-    whole = show(paper_store, *HERE, "--case")
+    whole = show("-r", paper_store, *HERE, "--case")
     assert "  speed_rpm: 500.0\n" in whole
     path.write_text(whole)
     (again,) = load_cases(path)
@@ -99,7 +93,7 @@ def test_the_case_is_shown_so_that_it_makes_the_same_job(paper_store, show, tmp_
 def test_of_a_chaotic_job_averages_are_told_and_peaks_are_not(show, tmp_path):
     solve = {"accuracy": "draft", "duration_rev": 11}  # averages over ten settled revolutions
     store_cases(tmp_path, wild=CHAOTIC | {"solve": solve})
-    out = show(tmp_path / "results", "wild")
+    out = show("-r", tmp_path / "results", "wild")
     told = values(out)
     assert told["peak acceleration"] == "unknown"
     assert told["acceleration"] == "unknown"

@@ -33,9 +33,6 @@ def mixed(tmp_path):
     return tmp_path
 
 
-# ---- rows ---------------------------------------------------------------------------------------
-
-
 def test_of_equal_rows_the_later_counts(tmp_path):
     write_batch(tmp_path, [made(1, 10), made(2, 20)])
     write_batch(tmp_path, [made(1, 11)])
@@ -90,9 +87,6 @@ def test_a_number_of_another_version_is_left_aside(tmp_path, monkeypatch):
     assert other.ravel().tolist()[1:] == [2, 3, 4]
 
 
-# ---- merges -------------------------------------------------------------------------------------
-
-
 def test_a_merge_changes_nothing_but_the_number_of_files(mixed):
     before, jobs = open_study(mixed).load(), held(read_store(mixed))
     merge_all(mixed)
@@ -141,9 +135,6 @@ def test_a_batch_whose_values_are_damaged_stays_while_its_rows_count(mixed):
     merge_all(mixed)
     assert path.exists()
     assert read_store(mixed).position(key(5)) is not None
-
-
-# ---- readers beside merges ----------------------------------------------------------------------
 
 
 def test_a_reader_that_loses_the_race_with_a_merge_reads_again(mixed, monkeypatch):

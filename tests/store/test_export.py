@@ -3,39 +3,29 @@
 import csv
 import shutil
 
+import made_jobs
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import flip, keep, write_cases
+from conftest import flip
 
-from compressor.cases.load import load_studies
 from compressor.metrics import METRICS, SIZES
-from compressor.solve.simulate import simulate
 from compressor.store.export import export
 from compressor.store.files import WrongName
 from compressor.store.reader import open_study, read_job, read_store
-from compressor.store.studies import write_study
-
-SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
-GRID = {"joint": "both", "clearance_mm": [0.1, 0.2], "solve": SHORT | {"max_steps": [5, 10**6]}}
-LIST = {
-    "joint": "big_end",
-    "clearance_mm": 0.1,
-    "machine": {"speed_rpm": {"lhs": [400, 600]}},
-    "sample": {"n": 2},
-    "solve": SHORT,
-    "output": {"precision": "single"},
-}
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     """A grid of four jobs, of which two failed, one is ok and one is missing; two sampled jobs."""
-    place = tmp_path_factory.mktemp("export")
-    folder = place / "results"
-    for study in load_studies(*write_cases(place, grid=GRID, list=LIST)):
-        write_study(folder, study, "compsim run")
-        keep(folder, *(simulate(case) for n, case in enumerate(study.cases) if n != 3))
+    steps = made_jobs.SHORT | {"max_steps": [5, 10**6]}
+    grid = made_jobs.study("grid", steps, joint="both", clearance_mm=[0.1, 0.2])
+    listed = made_jobs.study(
+        "list", joint="big_end", clearance_mm=0.1, sample={"n": 2},
+        machine={"speed_rpm": {"lhs": [400, 600]}}, output={"precision": "single"},
+    )  # fmt: skip
+    folder = tmp_path_factory.mktemp("export")
+    made_jobs.fill(folder, grid, listed, skip=(3,))
     return folder
 
 
@@ -116,5 +106,7 @@ def test_a_table_takes_no_other_s_place_unless_forced(results, tmp_path):
     (tmp_path / "grid.csv").touch()
     with pytest.raises(WrongName, match=r"grid\.csv: exists; --force replaces it"):
         export(results, ["grid"], tmp_path / "grid.csv")
+    with pytest.raises(WrongName, match="has studies, or one job; export each job to a file of"):
+        export(results, ["grid", "0a1b"], tmp_path / "two.csv")
     export(results, ["grid"], tmp_path / "grid.csv", force=True)
     assert len(table(tmp_path / "grid.csv")) == 4

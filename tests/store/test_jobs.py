@@ -12,7 +12,6 @@ from made_jobs import SHORT, batches, held, key, made
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 from compressor.store.batch import read_outcomes, write_batch
-from compressor.store.demands import serving_both
 from compressor.store.files import StoreError
 from compressor.store.reader import read_job, read_store
 
@@ -35,9 +34,6 @@ def job(request):
 @pytest.fixture(scope="module")
 def ideal():
     return simulate(Case.from_values({"solve": SHORT}))
-
-
-# ---- to compsim ---------------------------------------------------------------------------------
 
 
 def test_a_job_comes_back_identical_in_kind_and_bits(job, tmp_path):
@@ -114,9 +110,6 @@ def test_what_is_not_stored_is_no_job(ideal, tmp_path):
         read_job(tmp_path, name)
 
 
-# ---- to other programs --------------------------------------------------------------------------
-
-
 def test_xarray_opens_a_batch(ideal, tmp_path):
     """Jobs x metrics by their labels, and jobs x samples with units and joints."""
     failed = simulate(Case.from_values({"solve": SHORT, **STUCK}))
@@ -156,57 +149,3 @@ def test_a_few_lines_of_h5py_read_one_job(tmp_path):
         peak = file["value"][row, labels.index("peak_acceleration")]
     np.testing.assert_array_equal(acceleration, jobs[1].series["acceleration"].values)
     assert (unit, peak) == ("m/s2", 1.0)
-
-
-# ---- what a stored job serves -------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("kept", "reason", "asked", "serves"),
-    [
-        ("double", "", "metrics", True),
-        ("metrics", "", "double", False),
-        ("single", "", "double", False),
-        ("double", "", "single", True),
-        ("metrics", "budget_steps", "metrics", True),
-        ("metrics", "budget_seconds", "metrics", False),
-        ("metrics", "internal_error", "double", True),
-        ("metrics", "worker_died", "double", True),
-        ("metrics", "out_of_memory", "double", True),
-    ],
-)
-def test_what_a_stored_job_serves(kept, reason, asked, serves, tmp_path):
-    """kept, asked: the precision of its time series; metrics: there are none."""
-    more = {} if kept == "metrics" else {"samples": 3, "precision": kept}
-    write_batch(tmp_path, [made(1, reason=reason, **more)])
-    output = {"keep": "metrics"} if asked == "metrics" else {"precision": asked}
-    case = Case.from_values({"solve": {"error_bars": False}, "output": output})
-    end = read_store(tmp_path).status_at(0)
-    assert end.satisfies(case) == serves
-    again = end.with_stored_outputs(case).output
-    precisions = {kept, asked} - {"metrics"}
-    assert again.keep == ("series" if precisions else "metrics")
-    assert again.precision == min(precisions, default="double")
-
-
-DEMANDS = {  # what a job is asked for beside its identity: less, and more
-    "bars": ({"solve": {"error_bars": False}}, {}),
-    "horizon": ({"solve": {"horizon": False}}, {"solve": {"horizon": True}}),
-    "signals": ({}, {"output": {"signals": True}}),
-}
-
-
-@pytest.mark.parametrize("name", DEMANDS)
-def test_a_job_that_holds_more_serves_both(name, tmp_path):
-    few, all_ = (
-        Case.from_values({**STUCK, "solve": SHORT | more.get("solve", {}),
-                          "output": {"keep": "metrics"} | more.get("output", {})})
-        for more in DEMANDS[name]
-    )  # fmt: skip
-    assert few.key == all_.key
-    keep(tmp_path, simulate(few))
-    stored = read_store(tmp_path).status(few.key)
-    assert (stored.satisfies(few), stored.satisfies(all_)) == (True, False)
-    keep(tmp_path, simulate(all_))
-    stored = read_store(tmp_path).status(few.key)
-    assert all(map(stored.satisfies, (few, all_, serving_both(few, all_), serving_both(all_, few))))

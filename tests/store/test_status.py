@@ -9,7 +9,7 @@ from made_jobs import SHORT, fill, study
 
 from compressor.metrics import NUMBERS, QUANTILES
 from compressor.outcome import REGIME_WORDS, Regime
-from compressor.store.reader import open_study, read_store
+from compressor.store.reader import open_study
 from compressor.store.status import report_job, standings
 
 BRIEF = {"duration_rev": 3.2, "settle_rev": 0.2, "output_step_deg": 0.9}
@@ -26,19 +26,10 @@ def whole(tmp_path_factory):
     return folder
 
 
-def test_promise_and_regime_of_each_job_are_kept(whole):
+def test_promise_regime_and_statistics_of_each_job_are_kept(whole):
     found = open_study(whole)
     assert found["regime"].values.tolist() == [["", ""], ["chaotic", "periodic"]]
     assert found["promise"].values.tolist() == [["none", "none"], ["none", "kept"]]
-    for key, regime in zip(found["key"].values.flat, found["regime"].values.flat, strict=True):
-        assert read_store(whole).job(key).attrs["regime"] == regime
-
-
-def test_statistics_take_no_room_where_nothing_is_chaotic(whole, tmp_path):
-    fill(tmp_path, study("plain", output={"keep": "metrics"}))
-    assert read_store(tmp_path).given == {name for name, row in NUMBERS.items() if not row.when}
-    assert "quantile" not in open_study(tmp_path).dims
-    found = open_study(whole)
     statistics = {name for name, row in NUMBERS.items() if row.when == "chaotic"}
     assert statistics <= {*found.variables}
     assert found["quantile"].values.tolist() == list(QUANTILES)

@@ -19,8 +19,6 @@ from compressor.store.studies import (
     write_study,
 )
 
-# ---- files --------------------------------------------------------------------------------------
-
 
 def test_a_study_is_stored_and_found(tmp_path):
     one = study("speeds", machine={"speed_rpm": [300, 500]}, load=["spring", "none"])
@@ -67,9 +65,6 @@ def test_a_file_is_no_folder_of_results(tmp_path):
     (tmp_path / "case.yaml").touch()
     with pytest.raises(WrongName, match="is a file, where"):
         open_study(tmp_path / "case.yaml")
-
-
-# ---- names --------------------------------------------------------------------------------------
 
 
 def named(name, axes, keys, is_grid=True):

@@ -70,12 +70,6 @@ def named(payloads):
     return [(payload, payload, SECONDS.get(payload, math.inf)) for payload in payloads]
 
 
-def sleep(payload):
-    """Sleep for so long (s)."""
-    time.sleep(payload)
-    return payload
-
-
 def look(name):
     """What a worker finds: an environment variable, or what its files are."""
     if name != "files":
@@ -111,10 +105,6 @@ def is_prepared(folder, _):
 
 def refuse():
     raise MemoryError("no room for machine code")
-
-
-def leave(code):
-    os._exit(code)
 
 
 def crash_once(folder, at, payload):
@@ -158,7 +148,7 @@ def announced(payload, do=work):
 
 
 def harmful(case):
-    """Run a case, but for three that do harm: in place of `run_job`."""
+    """Run a case, but for four that do harm: in place of `run_job`."""
     from compressor.sweep.sweep import run_job
 
     match case.load, case.machine.rod_mass_kg:
@@ -168,21 +158,14 @@ def harmful(case):
             os.kill(os.getpid(), signal.SIGSEGV)
         case "spring", 4:
             bytearray(10**15)
-    return run_job(case)
-
-
-def felling(case):
-    """Run a case, but for one that kills its worker."""
-    from compressor.sweep.sweep import run_job
-
     if case.joint == "big_end" and abs(case.clearance_mm.big_end - 0.2017) < 0.001:
         os.kill(os.getpid(), signal.SIGKILL)
     return run_job(case)
 
 
-def run_felling_cases(*arguments):
-    """Do what a cluster's worker does, with `felling` jobs."""
+def run_harmful_cases(*arguments):
+    """Do what a cluster's worker does, with `harmful` jobs."""
     from compressor.sweep import cluster
 
-    cluster.run_job = felling
+    cluster.run_job = harmful
     return cluster.run_cases(*arguments)

@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import bad_jobs
@@ -14,7 +13,7 @@ import numpy as np
 import pytest
 from chaos.common import contents, differing
 from compsim.cli import main
-from conftest import write_cases
+from conftest import wait_for, write_cases
 
 from compressor.cases.load import load_studies
 from compressor.store import reader as store
@@ -26,37 +25,28 @@ from compressor.sweep.sweep import Options, sweep
 
 
 @pytest.fixture(scope="module")
-def living():
-    """Gives a cluster of two worker processes on this machine, with our path.
-
-    It is a new one where dask has not replaced a worker that a test has killed.
-    """
+def clusters():
+    """The clusters that were made for this module, with our path."""
     made = []
-
-    def cluster_of_two():
-        if made:
-            with contextlib.suppress(TimeoutError):
-                made[-1].wait_for_workers(2, timeout=15)
-                return made[-1]
-            made.pop().close()
-        os.environ["PYTHONPATH"] = os.pathsep.join(sys.path)
-        made.append(
-            distributed.LocalCluster(
-                n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
-            )
-        )
-        made[-1].wait_for_workers(2, timeout=60)
-        return made[-1]
-
-    yield cluster_of_two
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
+        yield made
     for one in made:
         one.close()
-    os.environ.pop("PYTHONPATH", None)
 
 
 @pytest.fixture
-def dask(living):
-    return living()
+def dask(clusters):
+    """Two worker processes, new ones where dask has not replaced one that a test has killed."""
+    with contextlib.suppress(TimeoutError, IndexError):
+        clusters[-1].wait_for_workers(2, timeout=15)
+        return clusters[-1]
+    made = distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
+    )
+    clusters.append(made)
+    made.wait_for_workers(2, timeout=60)
+    return made
 
 
 @pytest.fixture(scope="module")
@@ -85,22 +75,16 @@ def assert_same(folder, expected, but=""):
     assert not list(Path(folder).glob("**/.*"))
 
 
-def watched(backend, after, act):
-    """A backend that calls act() when so many jobs have ended."""
-
-    def run(*arguments):
-        for number, end in enumerate(backend(*arguments), 1):
-            if number == after:
-                act()
-            yield end
-
-    return run
-
-
 def test_a_worker_that_is_killed_costs_nothing(dask, studies, locally, tmp_path):
     victim = dask.workers[0].process.pid
     with connect_cluster(dask.scheduler_address) as backend:
-        killing = watched(backend, 8, lambda: os.kill(victim, signal.SIGKILL))
+
+        def killing(*arguments):
+            for number, end in enumerate(backend(*arguments)):
+                if number == 7:
+                    os.kill(victim, signal.SIGKILL)
+                yield end
+
         summary = sweep(studies, tmp_path / "out", options=Options(backend=killing))
     assert (summary.run_now, summary.failed) == (70, ())
     assert_same(tmp_path / "out", locally)
@@ -110,8 +94,8 @@ def test_a_worker_that_is_killed_costs_nothing(dask, studies, locally, tmp_path)
 
 def test_a_job_that_fells_its_workers_is_lost_alone(dask, studies, locally, tmp_path, monkeypatch):
     monkeypatch.setattr(dask.scheduler, "allowed_failures", 0)
-    monkeypatch.setattr(cluster, "run_job", bad_jobs.felling)
-    monkeypatch.setattr(cluster, "run_cases", bad_jobs.run_felling_cases)
+    monkeypatch.setattr(cluster, "run_job", bad_jobs.harmful)
+    monkeypatch.setattr(cluster, "run_cases", bad_jobs.run_harmful_cases)
     with connect_cluster(dask.scheduler_address) as backend:
         summary = sweep(studies, tmp_path / "out", options=Options(backend=backend))
     (lost,) = summary.failed
@@ -131,13 +115,6 @@ def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_p
         pytest.raises(StoreError, match="No space left on device"),
     ):
         sweep(studies[1:], tmp_path / "out", options=Options(backend=backend))
-
-
-def wait_until(condition):
-    until = time.monotonic() + 100
-    while not condition() and time.monotonic() < until:
-        time.sleep(0.05)
-    assert condition()
 
 
 def test_workers_with_other_programs_are_refused(dask, studies, tmp_path, monkeypatch):
@@ -183,11 +160,11 @@ def test_sigterm_keeps_what_is_finished_and_cancels_the_rest(dask, tmp_path):
     call = [sys.executable, "-m", "compsim", "run", str(config), "-r", str(out)]
     call += ["--scheduler", dask.scheduler_address]
     running = subprocess.Popen(call, stderr=subprocess.PIPE, text=True)
-    wait_until(lambda: list(out.glob("batches/*.h5")))
+    wait_for(lambda: list(out.glob("batches/*.h5")))
     running.send_signal(signal.SIGTERM)
     _, told = running.communicate(timeout=20)
     assert running.returncode == 143, told
     assert "interrupted by SIGTERM" in told
     assert 0 < len(store.read_store(out).keys()) < 5000
     assert not list(out.glob("batches/.*"))
-    wait_until(lambda: not dask.scheduler.tasks)
+    wait_for(lambda: not dask.scheduler.tasks)

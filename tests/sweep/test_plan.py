@@ -64,8 +64,11 @@ def test_all_is_compiled_that_a_timed_job_needs(studies, monkeypatch):
     monkeypatch.setattr(plan, "MAX_CASES", 1)
     compiled = []
     monkeypatch.setattr(plan, "compile_once", lambda parts, *_: compiled.append(parts))
-    timed(studies(one=NINE, two={"joint": "both", "clearance_mm": 0.1, "lubricant": True}), 1)
-    assert compiled == [(Part("laws"), Part("plain"))]
+    oiled = {"joint": "both", "clearance_mm": 0.1, "lubricant": True}
+    timed(studies(one=NINE, two=oiled), 1)
+    assert compiled == [(Part("laws"), Part("plain"))]  # none of a guide
+    timed(studies(guided=oiled | {"guide": True}), 1)
+    assert compiled[1:] == [(Part("features"),)]
 
 
 def test_a_job_that_is_timed_is_a_job_of_the_sweep(studies, monkeypatch):

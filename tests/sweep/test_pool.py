@@ -13,7 +13,8 @@ from pathlib import Path
 
 import bad_jobs
 import pytest
-from bad_jobs import LEAST, POISON, named, sleep, work
+from bad_jobs import LEAST, POISON, named, work
+from conftest import wait_for
 
 from compressor.store import StoreError
 from compressor.sweep import pool
@@ -60,16 +61,6 @@ def nothing_is_said(capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def wait_for(condition, seconds=60.0):
-    deadline = time.monotonic() + seconds
-    while not condition() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    assert condition()
-
-
-# ---- good jobs ----------------------------------------------------------------------------------
-
-
 def test_no_more_processes_start_than_there_are_jobs(monkeypatch):
     started = []
     start = pool.Worker.__init__
@@ -81,7 +72,8 @@ def test_no_more_processes_start_than_there_are_jobs(monkeypatch):
 
 def test_jobs_are_read_as_they_are_needed():
     issued = itertools.count()
-    ends = run_batches(sleep, ((n, 0.01, 9.0) for n in issued), Workers(target_seconds=0.05))
+    jobs = ((n, 0.01, 9.0) for n in issued)
+    ends = run_batches(time.sleep, jobs, Workers(target_seconds=0.05))
     list(itertools.islice(ends, 20))
     assert next(issued) < 200
     ends.close()
@@ -106,9 +98,6 @@ def test_what_is_prepared_is_not_timed(tmp_path):
     rules = Workers(2, partial(bad_jobs.prepare, tmp_path, 1.5), grace=0.2)
     ends = list(run_batches(partial(bad_jobs.is_prepared, tmp_path), jobs, rules))
     assert results(ends) == dict.fromkeys(range(4), True)
-
-
-# ---- poison -------------------------------------------------------------------------------------
 
 
 DEADLY = ("killed", "hang", "crash", "leave", "stop", "bomb")
@@ -145,21 +134,33 @@ def test_a_job_may_succeed_when_it_is_tried_again(tmp_path):
     assert 100 - min(again) <= 20  # those of its batch before it
 
 
-def test_a_worker_s_time_stands_still_with_ours():
-    """All are stopped, as by Ctrl-Z, for longer than the job may take."""
-    code = (
-        "import bad_jobs, functools; from compressor.sweep.pool import run_batches, Workers\n"
-        "sleep = functools.partial(bad_jobs.announced, do=bad_jobs.sleep)\n"
-        "jobs = [(n, 1.0, 1.5) for n in range(2)]\n"
-        "for end in run_batches(sleep, jobs, Workers(2, grace=0.5)): print(end)"
-    )
-    folder = Path(__file__).parent
-    running = subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        start_new_session=True, env=os.environ | {"PYTHONPATH": f"{folder}"},
+SCRIPT = """
+import bad_jobs, functools, signal, sys, time
+from compressor.sweep.pool import run_batches
+from compressor.sweep.worker import Workers
+
+signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+"""
+
+
+def started(folder, text):
+    """A process group that runs two jobs of a script; the script, and the jobs' processes."""
+    (folder / "script.py").write_text(SCRIPT + text)
+    script = subprocess.Popen(
+        [sys.executable, folder / "script.py"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True, start_new_session=True,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
     )  # fmt: skip
-    for _ in range(2):
-        running.stderr.readline()  # a job has begun
+    return script, [int(script.stderr.readline()) for _ in range(2)]
+
+
+def test_a_worker_s_time_stands_still_with_ours(tmp_path):
+    """All are stopped, as by Ctrl-Z, for longer than the job may take."""
+    running, _ = started(tmp_path, """
+sleep = functools.partial(bad_jobs.announced, do=time.sleep)
+for end in run_batches(sleep, [(n, 1.0, 1.5) for n in range(2)], Workers(2, grace=0.5)):
+    print(end)
+""")  # fmt: skip
     os.killpg(running.pid, signal.SIGSTOP)
     time.sleep(2.5)
     os.killpg(running.pid, signal.SIGCONT)
@@ -169,7 +170,7 @@ def test_a_worker_s_time_stands_still_with_ours():
 
 @pytest.mark.parametrize(
     ("prepare", "why"),
-    [(partial(bad_jobs.leave, 7), "exit code 7"),
+    [(partial(os._exit, 7), "exit code 7"),
      (bad_jobs.refuse, "MemoryError: no room for machine code")],
 )  # fmt: skip
 def test_workers_that_cannot_begin_end_the_call_and_say_why(prepare, why, monkeypatch):
@@ -186,9 +187,6 @@ def test_no_room_for_workers_ends_the_call(what, monkeypatch):
     monkeypatch.setattr(*what, refuse)
     with pytest.raises(WorkersFailed, match="no worker process can be started: no more processes"):
         list(run_batches(work, named(range(100)), Workers()))
-
-
-# ---- storing ------------------------------------------------------------------------------------
 
 
 def stored(folder, payloads, **more):
@@ -218,9 +216,6 @@ def test_a_job_that_cannot_be_stored_costs_itself_only(bad, reason, tmp_path):
 def test_a_disk_that_is_full_ends_the_call(tmp_path):
     with pytest.raises(StoreError, match="No space left on device"):
         stored(tmp_path, [*range(100), "full", *range(100)])
-
-
-# ---- ends ---------------------------------------------------------------------------------------
 
 
 def test_closing_ends_the_workers():
@@ -262,37 +257,18 @@ def test_a_worker_s_end_is_known_where_our_starter_ignores_it():
     assert [end.reason for end in lost(ends).values()] == ["worker_died"]
 
 
-PARENT = """
-import bad_jobs, signal, sys
-from compressor.sweep.pool import run_batches
-from compressor.sweep.worker import Workers
-
-signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-jobs = [(name, name, 1e9) for name in ("hang", "stop")]
-list(run_batches(bad_jobs.announced, jobs, Workers(2)))
-"""
-
-
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
 def test_no_process_outlives_its_parent(number, tmp_path):
     """A script without a guard: workers do not run the caller's main module."""
-    script = tmp_path / "script.py"
-    script.write_text(PARENT)
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
-    parent = subprocess.Popen(
-        [sys.executable, script], stderr=subprocess.PIPE, text=True, start_new_session=True,
-        env=environment,
-    )  # fmt: skip
-    pids = [int(parent.stderr.readline()) for _ in range(2)]
+    parent, pids = started(tmp_path, """
+jobs = [(name, name, 1e9) for name in ("hang", "stop")]
+list(run_batches(bad_jobs.announced, jobs, Workers(2)))
+""")  # fmt: skip
     assert all(map(is_running, pids))
     parent.send_signal(number)
     parent.wait(60)
     wait_for(lambda: not any(map(is_running, pids)))
-    assert parent.stderr.read() == ""  # until the last process of all has ended
-    parent.stderr.close()
-
-
-# ---- settings -----------------------------------------------------------------------------------
+    assert parent.communicate(timeout=60) == ("", "")  # until the last process of all has ended
 
 
 def test_memory_is_shared_among_workers(monkeypatch, tmp_path):
