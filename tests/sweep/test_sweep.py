@@ -2,7 +2,6 @@
 
 import os
 import re
-import subprocess
 import sys
 from functools import partial
 
@@ -165,40 +164,6 @@ def test_what_asks_the_program_to_end_is_no_failure_of_a_job():
     with pytest.raises(Interrupted):
         attempt(work, Interrupted())
     assert attempt(work, SystemExit(3)).reason == "internal_error"
-
-
-PARTS = """
-import sys
-import numba
-from compressor.cases.case import Case
-from compressor.solve import run
-from compressor.solve.simulate import measure
-from compressor.sweep.warm_up import KINDS
-march, found = sys.modules["compressor.physics.march"], set()
-def record(name, part):
-    def recorded(*given):
-        found.add((name, *map(numba.typeof, given)))
-        return part(*given)
-    return recorded
-for name in ("choose_method", "tally_step", "onset_ahead", "accumulate_metrics"):
-    setattr(march, name, record(name, getattr(march, name)))
-run.rehearse = lambda *given: march.rehearse(*given[:-1], 1)
-for kind in KINDS.values():
-    span = {"duration_rev": 0.002, "settle_rev": 0, "output_step_deg": 0.36, "error_bars": False}
-    case = Case.from_values({"joint": "both", "clearance_mm": 0.1, "solve": span} | kind)
-    measure(case)
-    marched = {*found}
-    found.clear()
-    run.compile_parts(case)
-    assert len(marched) == 4 and marched == found
-    found.clear()
-"""
-
-
-def test_what_a_copy_compiles_is_what_a_march_calls():
-    """Of other types it would serve nobody, and nobody would see that."""
-    values = {"COMPSIM_JIT": "0", "PYTHONPATH": os.pathsep.join(sys.path)}
-    subprocess.run([sys.executable, "-c", PARTS], env=os.environ | values, check=True)
 
 
 def test_a_job_that_cannot_be_stored_ends_the_sweep(studies, tmp_path, in_process):
