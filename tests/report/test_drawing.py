@@ -1,14 +1,19 @@
-"""Figures as plotly's: the limits of panels, what is read of a figure, and what the page gets."""
+"""Figures as plotly's: the limits of panels, tables, what the page gets, and pictures."""
 
 import csv
 import io
 import json
+import os
+import threading
 
 import numpy as np
 import plotly.graph_objects as go
 import pytest
 from conftest import decoded
+from matplotlib.colors import to_rgb
+from matplotlib.image import imread
 
+from compressor.report.figures import pictures
 from compressor.report.figures.drawing import as_csv, make_grid, outline_cells
 from compressor.report.figures.style import LineStyle, fill, mark, palette
 from compressor.report.interactive import MAX_POINTS, extremes, script
@@ -42,21 +47,15 @@ def drawing():
 
 def test_a_csv_has_every_number_once(drawing):
     head, *rows = csv.reader(io.StringIO(as_csv(drawing.figure())))
-    assert head[:3] == [
-        "whole: sine: angle (°)",
-        "whole: sine: F_x (kN)",
-        "whole: cosine: F_x (kN)",
-    ]
+    assert head[:2] == ["whole: sine: angle (°)", "whole: sine: F_x (kN)"]
     assert not [title for title in head if title.startswith("enlarged")]  # the same numbers
     columns = dict(zip(head, zip(*rows, strict=True), strict=True))
-    assert [float(v) for v in columns["whole: cosine: F_x (kN)"]] == pytest.approx(
-        np.cos(np.radians(X)), abs=1e-7
-    )
+    cosine = np.array(columns["whole: cosine: F_x (kN)"], float)
+    assert cosine == pytest.approx(np.cos(np.radians(X)), abs=1e-7)
     assert columns["3: peak (kN)"][:4] == ("1", "10", "100", "")
     assert columns["3: job"][:5] == ("a", "b", "c", "d", "")
-    assert [columns[f"4: jobs: {end}"][:2] for end in ("below", "above")] == [
-        ("0.1", "0.2"), ("0.3", "0.4"),
-    ]  # fmt: skip
+    assert columns["4: jobs: below"][:2] == ("0.1", "0.2")
+    assert columns["4: jobs: above"][:2] == ("0.3", "0.4")
 
 
 def test_jobs_at_one_place_all_stand_in_the_csv():
@@ -75,9 +74,8 @@ def test_panels_of_the_same_jobs_share_columns_and_name_their_axes():
         panel.y.title = "" if column else f"y{row}"
     head, *rows = csv.reader(io.StringIO(as_csv(drawing.figure())))
     assert [title for title in head if title.endswith("job")] == ["1: a job: job"]
-    assert [title.rpartition(" ")[2] for title in head] == [
-        "x0", "y0", "job", "x1", "y0", "x0", "y1", "x1", "y1"
-    ]  # fmt: skip
+    names = [title.rpartition(" ")[2] for title in head]
+    assert names == ["x0", "y0", "job", "x1", "y0", "x0", "y1", "x1", "y1"]
     assert rows[0] == ["0", "0", "k1", "0", "1", "1", "0", "1", "1"]
 
 
@@ -116,8 +114,8 @@ def test_axes_read_in_the_unit_that_is_wanted():
               (1.0, 4.0), "force ({})", "N")  # fmt: skip
     figure = drawing.figure()
     curve, cells = figure.data
-    assert (figure.layout.yaxis.title.text, figure.layout.xaxis.title.text) == (
-        "a (g)", "crank angle (°)")  # fmt: skip
+    assert figure.layout.yaxis.title.text == "a (g)"
+    assert figure.layout.xaxis.title.text == "crank angle (°)"
     assert curve.x.tolist() == [0.0, 90.0]
     assert curve.y == pytest.approx([1.0, -2.0])
     assert curve.error_y.array == pytest.approx([1.0, 1.0])
@@ -168,3 +166,84 @@ def test_a_word_that_is_a_number_stands_in_the_table():
     panel.name_ticks("x", ["0", "1"], [0.0, 1.0])
     _, *rows = csv.reader(io.StringIO(as_csv(drawing.figure())))
     assert [row[0] for row in rows] == ["0", "1"]
+
+
+# ---- pictures, by two processes: the same bytes, and none lost with a process
+
+
+@pytest.fixture
+def figures():
+    made = []
+    for number in range(5):
+        drawing, grid = make_grid(1, 1, 2.0)
+        grid[0, 0].plot([0, 1], [number, 2], LineStyle("#000000"))
+        made.append(drawing.figure())
+    return [lambda one=one: pictures.render(one) for one in made]
+
+
+@pytest.fixture
+def alone(figures):
+    return [draw() for draw in figures]
+
+
+@pytest.fixture
+def two(monkeypatch):
+    """Two processes draw, whatever threads another test has left here, which are idle."""
+    monkeypatch.setattr(threading, "active_count", lambda: 1)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 1}, raising=False)
+
+
+def elsewhere(monkeypatch, act):
+    """Do this first in each picture that another process draws."""
+    here, draw = os.getpid(), pictures.render
+
+    def first(figure):
+        if os.getpid() != here:
+            act()
+        return draw(figure)
+
+    monkeypatch.setattr(pictures, "render", first)
+
+
+def test_panels_that_share_decades_draw_them_alike():
+    """All but the first had the ticks of a log scale on a linear one."""
+    drawing, grid = make_grid(1, 2, 2.0, share_x="all")
+    for panel in grid.flat:
+        panel.plot([1, 10, 100], [1, 2, 3], LineStyle("#000000"))
+    grid[0, 0].x.type = "log"
+    for axes in pictures.paint(drawing.figure()).axes:
+        x, _ = axes.transData.transform([(1, 2), (10, 2), (100, 2)]).T
+        assert x[1] - x[0] == pytest.approx(x[2] - x[1])
+
+
+def test_two_processes_draw_what_one_does(figures, alone, two, monkeypatch, tmp_path, capfd):
+    elsewhere(monkeypatch, lambda: (tmp_path / str(os.getpid())).touch())
+    assert pictures.draw_all(figures) == alone
+    assert capfd.readouterr().err == "drawing 5 figures\n"
+    assert 1 <= len([*tmp_path.iterdir()]) <= 2
+
+
+def test_a_process_that_dies_costs_nothing(figures, alone, two, monkeypatch):
+    elsewhere(monkeypatch, lambda: os._exit(9))
+    assert pictures.draw_all(figures) == alone
+
+
+def test_beside_threads_no_process_is_copied(figures, alone, monkeypatch):
+    monkeypatch.setattr(pictures, "ProcessPoolExecutor", pytest.fail)
+    monkeypatch.setattr(threading, "active_count", lambda: 2)
+    assert pictures.draw_all(figures) == alone
+    assert pictures.draw_all([]) == []
+
+
+def test_a_picture_shows_what_the_figure_has():
+    """Each kind of trace is drawn in its colour: a curve, an area, bars and a map."""
+    drawing, (curve, area, bars, cells) = (made := make_grid(1, 4, 3.0))[0], made[1].flat
+    colors = {"curve": "#ff0000", "area": "#00ff00", "bars": "#0000ff", "map": "#ff00ff"}
+    curve.plot([0, 1], [0, 1], LineStyle(colors["curve"], linewidth=4))
+    area.fill([0, 1, 1], [0, 0, 1], fill(colors["area"]))
+    bars.bars([1.0, 2.0], [0.0, 1.0], fill(colors["bars"]))
+    cells.map(np.zeros(1), np.zeros(1), np.array([[0.0]]), [colors["map"], "#ffffff"], (0.0, 1.0))
+    seen = imread(io.BytesIO(pictures.render(drawing.figure())))[..., :3]
+    for name, color in colors.items():
+        share = np.isclose(seen, to_rgb(color)).all(axis=2).mean()
+        assert share > 0.001, name

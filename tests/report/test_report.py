@@ -1,6 +1,7 @@
 """The report: what is on the page, what is not, and that nothing on it escapes or reaches out."""
 
 import base64
+import csv
 import html.parser
 import json
 import re
@@ -12,10 +13,10 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 import xarray as xr
-from compsim import cli
 from conftest import damage_series, keep, part_of, store, store_cases, without_pictures
 
 from compressor.analysis import last_revolution, paper_cases
+from compressor.analysis.runs import CLEARANCES, FAULTS, case_of, label
 from compressor.cases import Case, load_cases, load_studies
 from compressor.program import CompsimWarning
 from compressor.reasons import Reason
@@ -24,17 +25,10 @@ from compressor.report.figures import FIGURES, pictures
 from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.table import spell
 from compressor.report.interactive import draw_job, job_scripts, script, series_name
-from compressor.report.paper_sections import find_runs
+from compressor.report.paper_sections import comparable, find_runs
 from compressor.report.report import KINDS
-from compressor.store import (
-    StoreWarning,
-    read_job,
-    read_store,
-    read_studies,
-    study_caveats,
-    write_study,
-)
-from compressor.store.studies import encode
+from compressor.store import StoreWarning, read_job, read_store, read_studies, study_caveats
+from compressor.store.studies import encode, write_study
 
 SHORT = ["solve.duration_rev=0.1", "solve.settle_rev=0", "solve.output_step_deg=1"]
 DRAFT = ["solve.accuracy=draft"]
@@ -104,19 +98,17 @@ def written(results, place, *command, **how):
     return read(place / "out")
 
 
+@pytest.fixture(scope="module", autouse=True)
+def unpainted():
+    """No pixels are made, which takes seconds; test_figures paints each figure."""
+    with without_pictures():
+        yield
+
+
 @pytest.fixture(scope="module")
 def full(once, paper_store):
-    def fill(folder):
-        with without_pictures():
-            write_report(paper_store, folder, f"compsim report {EVIL}")
-
-    return once("full-report-without-pictures", fill)
-
-
-@pytest.fixture(autouse=True)
-def unpainted(monkeypatch):
-    """No pixels are made, which takes seconds; test_figures paints each figure."""
-    monkeypatch.setattr(pictures, "render", lambda drawing: bytes(24))
+    command = f"compsim report {EVIL}"
+    return once("unpainted-report", lambda folder: write_report(paper_store, folder, command))
 
 
 @pytest.fixture(scope="module")
@@ -142,9 +134,9 @@ def fail(folder, key, reason, detail):
     replace_jobs(folder, bad)
 
 
-def replace_jobs(folder, *jobs):
+def replace_jobs(folder, *jobs, without=()):
     """Put jobs in place of what was stored of them, which a failed run by itself never is."""
-    kept = {key: read_job(folder, key) for key in sorted(read_store(folder).keys())}
+    kept = {key: read_job(folder, key) for key in sorted(read_store(folder).keys() - {*without})}
     kept |= {job.attrs["key"]: job for job in jobs}
     shutil.rmtree(folder / "batches")
     keep(folder, *kept.values())
@@ -236,17 +228,10 @@ def test_every_claim_has_a_verdict(full):
 # ---- what is missing --------------------------------------------------------------------------
 
 
-def forget(folder, key):
-    stored = read_store(folder)
-    others = [stored.job(other).load() for other in sorted(stored.keys() - {key})]
-    shutil.rmtree(folder / "batches")
-    keep(folder, *others)
-
-
-def test_missing_cases_are_named_with_what_gives_them(paper_store, tmp_path):
+def test_missing_cases_are_named_with_what_gives_them(paper_store, tmp_path, compsim):
     part = part_of(paper_store, tmp_path / "part", "design", "typical", "big-end")
     first, gone, last = next(s for s in read_studies(part) if s.name == "big-end").keys
-    forget(part, gone)
+    replace_jobs(part, without=[gone])
     (tmp_path / "out").mkdir()
     for name in ("figure-09.csv", "job-old.js"):
         (tmp_path / "out" / name).write_text("an earlier report's")
@@ -262,7 +247,7 @@ def test_missing_cases_are_named_with_what_gives_them(paper_store, tmp_path):
     assert "typical model needs" not in found.text
     assert "compsim init paper writes a file that has all cases of the paper" in found.text
     assert f"compsim run paper.yaml -r {part} runs those that are not stored" in found.text
-    assert cli.main(["init", "paper", "-o", str(tmp_path / "paper.yaml")]) == 0
+    compsim("init", "paper", "-o", tmp_path / "paper.yaml")
     given = {case.physics_key for case in load_cases(tmp_path / "paper.yaml")}
     assert given == {case.physics_key for case in paper_cases().values()}
     rows = {cells[0]: kind for kind, cells in found.rows}
@@ -400,7 +385,7 @@ def test_a_study_says_what_was_given_swept_and_assumed(own, tmp_path):
     assert "viscosity" not in assumed  # there is no oil
 
 
-def test_studies_are_chosen_and_trials_come_last(own, tmp_path, capsys):
+def test_studies_are_chosen_and_trials_come_last(own, tmp_path, compsim):
     """The 18 jobs of a search headed the page, since their name comes first."""
     (study,) = read_studies(own)
     trial = replace(study, name="a-find-x", command="compsim find own.yaml --over x=1:2")
@@ -410,13 +395,11 @@ def test_studies_are_chosen_and_trials_come_last(own, tmp_path, capsys):
     first = section(tmp_path / "out", "answer")
     assert "Study a-find-x : 4 jobs" in first
     assert first.count("Peak contact force") == 1
-    report = ["report", "-r", str(own), "-o", str(tmp_path / "out")]
-    assert cli.main([*report, "a-find-x"]) == 0
+    report = ["report", "-r", own, "-o", tmp_path / "out"]
+    compsim(*report, "a-find-x")
     assert "study-own" not in read(tmp_path / "out").ids
     assert "Peak contact force" in section(tmp_path / "out", "answer")
-    capsys.readouterr()
-    assert cli.main([*report, "onw"]) == 2
-    assert "did you mean own" in capsys.readouterr().err
+    assert "did you mean own" in compsim(*report, "onw", code=2).err
 
 
 def test_a_study_among_the_paper_s_cases_keeps_its_section_and_notes(paper_store, tmp_path):
@@ -433,10 +416,9 @@ def test_a_study_among_the_paper_s_cases_keeps_its_section_and_notes(paper_store
     assert "Rod weighed in March." in section(tmp_path / "out", "study-noted")
 
 
-def test_a_page_is_one_file(own, tmp_path, capsys):
+def test_a_page_is_one_file(own, tmp_path, compsim):
     """By mail the page came without its figures."""
-    assert cli.main(["report", "-r", str(own), "--single", "-o", str(tmp_path / "mailed")]) == 0
-    out, err = capsys.readouterr()
+    out, err = compsim("report", "-r", own, "--single", "-o", tmp_path / "mailed")
     file = tmp_path / "mailed.html"
     assert out == f"{file}\n"
     assert " MB, all in one file" in err
@@ -459,7 +441,7 @@ def test_failed_jobs_are_highlighted_and_everything_is_escaped(own, tmp_path):
     """All that is not the program's own: texts of the case file, of commands and of failures."""
     (study,) = read_studies(own)
     fail(own, study.keys[2], "non_finite", f"detail {EVIL}")
-    forget(own, study.keys[3])
+    replace_jobs(own, without=[study.keys[3]])
     texts = {name: f"{name} {EVIL}" for name in ("case_file", "command", "title", "notes")}
     evil = replace(study, overrides=(f"set {EVIL}",), **texts)
     (own / "studies" / "own.json").write_bytes(encode(evil))
@@ -483,9 +465,8 @@ def test_a_study_whose_card_is_gone_costs_the_page_itself_alone(own, tmp_path):
     rows = (f"{angle},{0.4 + 0.2 * np.cos(np.radians(angle))}" for angle in range(0, 360, 5))
     card.write_text("\n".join(["crank_angle_deg,pressure_MPa", *rows]))
     file = tmp_path / "measured.yaml"
-    file.write_text(
-        f"load: gas\ngas: {{indicator: {{head: {card}}}}}\nclearance_mm: 0.1\njoint: both\n"
-    )
+    gas = f"gas: {{indicator: {{head: {card}}}}}\n"
+    file.write_text(f"load: gas\n{gas}clearance_mm: 0.1\njoint: both\n")
     store(own, file, overrides=[*SHORT, *DRAFT])
     card.unlink()
     with pytest.warns(CompsimWarning, match="study measured is left out: .*put the card of that"):
@@ -551,3 +532,65 @@ def test_only_jobs_that_kept_their_series_have_scripts(paper_store, monkeypatch)
     assert found[keys[0]] == script(series_name(keys[0]), draw_job(stored.job(keys[0])))
     monkeypatch.setattr(interactive, "MAX_SERIES", 2)
     assert [key for key, _ in job_scripts(stored, keys)] == keys[:2]
+
+
+# ---- the paper's figures of a machine of one's own
+
+
+HEAVY = {"rod_mass_kg": 3, "reciprocating_mass_kg": 20}
+NINE = {"joint": [*FAULTS], "clearance_mm": [*CLEARANCES]}
+CASE = {"machine": HEAVY, "report": {"figures": "paper"}, "solve": {"accuracy": "draft"},
+        "blocks": [{"joint": "none"}, NINE]}  # fmt: skip
+FILES = {f"heavy-figure-{n:02d}" for n in (4, *range(8, 17))}
+
+
+@pytest.fixture(scope="module")
+def heavy_store(once):
+    """A store with the study `heavy`: an ideal machine and the nine faults, with other masses."""
+    return once("heavy-own", lambda folder: store_cases(folder, heavy=CASE)) / "results"
+
+
+def test_runs_on_other_grids_cannot_be_drawn_together(heavy_store):
+    study = read_studies(heavy_store)[0]
+    found = [read_store(heavy_store).job(key) for key in study.keys]
+    assert comparable(found)
+    later = found[1].assign_attrs(settle=2 * found[1].attrs["settle"])
+    assert not comparable([found[0], later])
+    assert not comparable([found[0], found[1].isel(time=slice(None, -1))])
+    turn = [run.isel(time=slice(None, 2401)) for run in found]  # the first revolution is start-up
+    assert comparable(turn)
+    assert not comparable([run.isel(time=slice(None, -1)) for run in turn])
+    assert comparable([run.isel(time=slice(None, None, 40)) for run in turn])  # 12 degrees
+    assert not comparable([run.isel(time=slice(None, None, 50)) for run in turn])
+
+
+def test_figures_captions_and_claims_are_the_machine_s(heavy_store, tmp_path):
+    write_report(heavy_store, tmp_path / "out")
+    assert {path.stem for path in (tmp_path / "out").glob("*.png")} == FILES  # and no sweep
+    found, study = read(tmp_path / "out"), read_studies(heavy_store)[0]
+    order = [i for i in found.ids if i in ("figures-heavy", "heavy-figure-08", "study-heavy")]
+    assert order == ["study-heavy", "figures-heavy", "heavy-figure-08"]
+    runs = find_runs(read_store(heavy_store), [study], paper_cases(**HEAVY)).usable
+    of = [runs[label("both", c)] for c in CLEARANCES]
+    assert {case_of(run).machine.reciprocating_mass_kg for run in of} == {20}
+    peaks = [float(run["peak_contact_force_axis"].sel(joint="big_end", axis="x")) for run in of]
+    for words in (
+        "heavy: Figure 15: Contact force at the big end",
+        f"Greatest along the cylinder at 0.1, 0.2, 0.3 mm: {spell(np.array(peaks) / 1e3)} kN",
+        " ".join(FIGURES["paper"]["figure-08"].make(runs).caption.split()),
+        "are drawn of this machine, but not Figures 3, 6, 7, whose",
+        "Figure 4 · Figure 8 · Figure 9",  # each link had the study's name
+        "rod mass 3 kg",
+    ):
+        assert words in found.text
+    table = (tmp_path / "out" / "heavy-figure-15.csv").read_text(encoding="utf-8")
+    _, *rows = csv.reader(table.splitlines())
+    forces = np.array(rows)[:, 1:4].astype(float)  # along the cylinder, beside the crank angle
+    series = [run["contact_force"].sel(joint="big_end", axis="x").values[-1201:] for run in of]
+    assert forces == pytest.approx(np.array(series).T / 1e3, rel=1e-6, abs=1e-6)
+    rows = [cells for _, cells in found.rows if cells[0].startswith("(")]
+    verdicts = [cells[1].partition("margin")[0] for cells in rows]
+    assert verdicts[:2] == ["not measured"] * 2
+    assert {*verdicts[2:]} <= {"held", "not held"}
+    assert {"claims-heavy-1", "claims-heavy-8"} <= {*found.ids}
+    assert {*found.jobs} >= {*study.keys}  # its table
