@@ -2,7 +2,7 @@
 
 Natural scales are closed formulas of a case's parameters alone. Forces are bounds; the deepest
 contact of random cases is 0.6 to 1.6 times as deep as they say in nine of ten
-(tests/analysis/test_scales.py).
+(tests/analysis/test_cautions.py).
 
 A key looks as if it were given in another unit where every value that it has in a study lies
 outside its usual range, and that unit would bring all of them inside. An oddity is reported once a

@@ -69,21 +69,13 @@ def test_the_healthy_twin_has_nothing_that_only_a_clearance_can_have(more):
     np.testing.assert_array_equal(one["acceleration"].values, other["acceleration"].values)
 
 
-@pytest.fixture(scope="module")
-def exact():
-    """The least and the greatest clearance at one joint, `accuracy: standard` as by default."""
-    cases = paper_cases()
-    names = [f"{joint} {c}" for joint in ("big_end", "small_end") for c in ("0.1", "0.3")]
-    return {name: simulate(cases[name]) for name in names}
-
-
 @pytest.mark.parametrize(
     ("name", "above"),
     [("big_end 0.1", 475), ("big_end 0.3", 1025), ("small_end 0.1", 639), ("small_end 0.3", 555)],
 )
-def test_force_above_order_12_of_the_paper_s_cases(exact, name, above):
+def test_force_above_order_12_of_the_paper_s_cases(name, above):
     """Once measured apart from this code, by numpy's Fourier transform of 3 revolutions."""
-    run = exact[name]
+    run = simulate(paper_cases()[name])
     assert shaking(run).above == pytest.approx(above, rel=0.02)
     kept = slice(1200, 4800)
     force = frame_forces(run)["shaking_force"][kept, 0]
