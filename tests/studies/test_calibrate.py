@@ -51,9 +51,7 @@ def design(unknowns, seed=1):
 def fit_of(truth, seed, **kinds):
     amplitudes, errors = measured(truth, seed, **kinds)
     mass = kinds.get("mass", True)
-    return fit_orders(
-        lambda shares: accelerations(shares, mass), amplitudes, errors, design(len(truth))
-    )
+    return fit_orders(lambda s: accelerations(s, mass), amplitudes, errors, design(len(truth)))
 
 
 def test_known_numbers_come_back():
@@ -138,9 +136,7 @@ CASE = {
     "load": "gas",
     "gas": {"switching": "exact"},
     "body": True,
-    "sensor": {
-        "rate_Hz": 2560, "mounting_Hz": 2500, "noise_m_per_s2": 0.001, "length_rev": 8,
-    },
+    "sensor": {"rate_Hz": 2560, "mounting_Hz": 2500, "noise_m_per_s2": 0.001, "length_rev": 8},
     "solve": {"duration_rev": 2},
 }  # fmt: skip
 TRUTH = {"machine.reciprocating_mass_kg": 16.0, "body.mass_kg": 450.0}
@@ -167,8 +163,8 @@ def fitted(tmp_path_factory):
 
 
 def test_the_machine_of_a_record_comes_back(fitted, monkeypatch, compsim):
-    """Values in their intervals, these narrow; asked again nothing runs."""
-    place, words, _ = fitted
+    """Values in their intervals, these narrow; asked again nothing runs. Printed is a case file."""
+    place, words, text = fitted
     monkeypatch.chdir(place)
     stored = len(read_store("results").keys())
     found = json.loads(compsim(*words, "--json").out)
@@ -182,11 +178,6 @@ def test_the_machine_of_a_record_comes_back(fitted, monkeypatch, compsim):
     assert found["not_told_apart"] == []
     assert found["speed_rpm"] == pytest.approx(500.0, abs=0.05)
     assert len(read_store("results").keys()) == stored
-
-
-def test_what_is_printed_is_a_case_file(fitted, monkeypatch):
-    place, _, text = fitted
-    monkeypatch.chdir(place)
     Path("sound.yaml").write_text(text)
     (case,) = load_cases("sound.yaml")
     assert case.machine.reciprocating_mass_kg == pytest.approx(16.0, rel=0.06)

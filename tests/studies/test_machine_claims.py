@@ -73,9 +73,8 @@ def test_the_command_prints_and_writes(stored, tmp_path, monkeypatch, compsim):
 
 @pytest.mark.parametrize("name", ["claims", "assumptions"])
 def test_every_machine_of_the_examples_has_all_cases(name):
-    (study,) = load_studies(
-        templates()[name].path, overrides=["sample.n=2"] if name != "claims" else []
-    )
+    few = [] if name == "claims" else ["sample.n=2"]
+    (study,) = load_studies(templates()[name].path, overrides=few)
     found = paper.machines(study)
     assert {len(jobs) for jobs in found.values()} == {11}
     assert len(found) * 11 == study.jobs
@@ -95,10 +94,8 @@ def test_the_indices_of_ishigami_s_function():
     points = np.array(design("saltelli", 512, 3, 1))
     margin = np.full((len(points), 8), 0.5)
     margin[:, 2] = ishigami(points)
-    coords = {
-        name: ("machine", column, {"case_key": name})
-        for name, column in zip(KEYS, points.T, strict=True)
-    }
+    columns = zip(KEYS, points.T, strict=True)
+    coords = {name: ("machine", column, {"case_key": name}) for name, column in columns}
     drawn = machines_of(margin, coords)
     found = paper.sensitivity(drawn)
     assert found["assumption"].values.tolist() == [*KEYS]
@@ -130,9 +127,8 @@ def machines_of(margin, coords):
 
 def test_machines_are_counted():
     """Claim 8 holds from a rod mass of 4 kg on, by 0.1 a kg; all others hold, but 7 nowhere."""
-    rods, masses = (
-        part.ravel() for part in np.meshgrid(np.arange(2.0, 8.0), np.arange(10.0, 14.0))
-    )
+    plane = np.meshgrid(np.arange(2.0, 8.0), np.arange(10.0, 14.0))
+    rods, masses = (part.ravel() for part in plane)
     margin = np.full((rods.size, 8), 0.5)
     margin[:, 7], margin[:, 6] = 0.1 * (rods - 4.0), -0.12
     margin[:, 2] = 0.3 - 0.02 * np.abs(masses - 11.0)

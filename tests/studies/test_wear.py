@@ -32,26 +32,21 @@ wear: {limit_mm: 0.23, step_mm: 0.01}
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("worn")
-    (folder / "bearing.yaml").write_text(TEXT, encoding="utf-8")
-    return folder
-
-
-@pytest.fixture(scope="module")
-def told(place):
-    here, out = place / "bearing.yaml", place / "results"
+def told(tmp_path_factory):
+    file = tmp_path_factory.mktemp("worn") / "bearing.yaml"
+    file.write_text(TEXT, encoding="utf-8")
+    out = file.with_name("results")
     with jobs_here():
-        assert main(["wear", str(here), "-r", str(out), "-j", "2", "--quiet"]) == 0
-    return load_cases(here), out
+        assert main(["wear", str(file), "-r", str(out), "-j", "2", "--quiet"]) == 0
+    return file, load_cases(file), out
 
 
-def test_a_line_for_each_machine_says_when_it_is_worn_out(told, place, compsim):
-    cases, out = told
-    said = compsim("wear", place / "bearing.yaml", "-r", out)
+def test_a_line_for_each_machine_says_when_it_is_worn_out(told, compsim):
+    file, cases, out = told
+    said = compsim("wear", file, "-r", out)
     _, *lines = said.out.splitlines()
     assert "all 2 machines are stored" in said.err
-    numbers = json.loads(compsim("wear", place / "bearing.yaml", "-r", out, "--json").out)
+    numbers = json.loads(compsim("wear", file, "-r", out, "--json").out)
     for line, one, case in zip(lines, numbers, cases, strict=True):
         assert f"machine.speed_rpm={case.machine.speed_rpm}" in line
         assert f"{one['hours']:.4g}" in line
@@ -70,7 +65,7 @@ def test_a_line_for_each_machine_says_when_it_is_worn_out(told, place, compsim):
 @pytest.mark.slow
 def test_a_killed_machine_goes_on_and_ends_in_the_same_bits(told, tmp_path):
     """SIGKILL at random, until all stages are there."""
-    cases, out = told
+    _, cases, out = told
     worn, rng, stops = Worn(cases[0]), np.random.default_rng(3), []
     worn.make_row([])  # loads the equations, which forked processes share
     path = worn.path(tmp_path)
@@ -95,10 +90,8 @@ def test_a_killed_machine_goes_on_and_ends_in_the_same_bits(told, tmp_path):
     assert len({*stops}) > 1
 
 
-def test_a_failed_machine_is_told_and_goes_on_when_asked(
-    place, tmp_path, compsim, monkeypatch, in_process
-):
-    file = place / "failing.yaml"
+def test_a_failed_machine_goes_on_when_asked(tmp_path, compsim, monkeypatch, in_process):
+    file = tmp_path / "failing.yaml"
     file.write_text(TEXT.replace("[400, 500]", "400"), encoding="utf-8")
     follow, calls = wear.follow_stage, []
 
@@ -130,10 +123,7 @@ def test_a_failed_machine_is_told_and_goes_on_when_asked(
     ("text", "message"),
     [
         ("joint: big_end\nclearance_mm: 0.2\n", "has no wear: write wear: true"),
-        (
-            TEXT.replace("duration_rev: 1", "duration_rev: 2.5"),
-            "2.5 after settle_rev must be whole",
-        ),
+        (TEXT.replace("_rev: 1", "_rev: 2.5"), "2.5 after settle_rev must be whole"),
         (TEXT + "lubricant: true\n", "leave out lubricant or wear"),
         (TEXT.replace("0.23", "0.1"), "0.1 mm must be more than the clearance, 0.2 mm"),
         ("joint: [none, big_end]\nclearance_mm: 0.1\nwear: true\n", "none has no bore that wears"),
@@ -147,7 +137,7 @@ def test_what_cannot_wear_is_refused(text, message, tmp_path, compsim):
 
 
 def test_a_file_of_something_else_is_told(told, tmp_path):
-    cases, out = told
+    _, cases, out = told
     place = Worn(cases[1]).path(tmp_path)
     place.parent.mkdir(parents=True)
     place.write_bytes(Worn(cases[0]).path(out).read_bytes())
@@ -191,11 +181,15 @@ def test_a_volume_is_the_coefficient_times_what_has_slid(machine):
     assert found["worn_volume"].values[-1, 0] == pytest.approx(volume, rel=1e-9)
     assert not found["worn_volume"].values[:, 1].any()
     assert not found["clearance"].values[:, 1].any()
+    opened = 1e3 * found["clearance"].values[:, 0]
+    assert opened[0] == 0.2
+    assert np.diff(opened) == pytest.approx(0.01, rel=0.2)  # by its step until the limit
+    assert opened[-2] < 0.26 <= opened[-1]
+    assert (np.diff(found["hours"].values) > 0).all()
 
 
 def test_stages_are_ordinary_runs_at_their_clearances(machine):
-    of, stages = machine
-    stage = stages[2]
+    of, (_, _, stage, *_) = machine
     values = VALUES | {"clearance_mm": 1e3 * float(stage["clearance"][0])}
     run = simulate(Case.from_values(values))
     assert of.case_at(stage["clearance"]).key == Case.from_values(values).key
@@ -205,21 +199,11 @@ def test_stages_are_ordinary_runs_at_their_clearances(machine):
     assert stage["peak_contact_force"] == pytest.approx(run["peak_contact_force"].values, rel=1e-12)
 
 
-def test_stages_grow_by_their_step_until_the_limit(machine):
-    _, stages = machine
-    opened = [1e3 * stage["clearance"][0] for stage in stages]
-    assert opened[0] == 0.2
-    assert np.diff(opened) == pytest.approx(0.01, rel=0.2)
-    assert opened[-2] < 0.26 <= opened[-1]
-    assert (np.diff([stage["hours"] for stage in stages]) > 0).all()
-
-
 def test_a_coefficient_is_a_scale_of_hours(machine):
     """The same clearances, a tenth of the hours: what the interval of a life rests on."""
     of, stages = machine
     tenfold, faster = followed({"step_mm": 0.01, "coefficient_mm3_per_N_m": 1e-7})
-    one, other = (life(*pair) for pair in (
-        (of, of.to_dataset(stages)), (tenfold, tenfold.to_dataset(faster))))  # fmt: skip
+    one, other = life(of, of.to_dataset(stages)), life(tenfold, tenfold.to_dataset(faster))
     assert other.hours == pytest.approx(one.hours / 10, rel=1e-5)
     assert (one.low, one.high) == pytest.approx((one.hours / 2, one.hours * 2))
     assert one.joint == "big_end"
@@ -248,13 +232,6 @@ def test_a_life_beyond_the_hours_is_not_told(machine):
     assert math.isnan(found.high)
 
 
-def test_a_motion_that_fails_ends_its_machine():
-    _, stages = followed({}, solve={"accuracy": "draft", "max_steps": 300})
-    assert len(stages) == 1
-    assert stages[0]["reason"] == "budget_steps"
-    assert "300 steps" in stages[0]["detail"]
-
-
 def test_a_speed_that_gives_way_takes_longer_for_a_revolution():
     soft = {"drive": {"slope_N_m_s": 10.0, "flywheel_kg_m2": 5.0}, "load": "gas"}
     of = Worn(Case.from_values({**VALUES, **soft, "wear": True}))
@@ -263,11 +240,19 @@ def test_a_speed_that_gives_way_takes_longer_for_a_revolution():
     assert found["turn"] > 1.001 * of.case.turn
 
 
-def test_a_clearance_beyond_the_pin_ends_the_study_with_a_reason():
-    worn = Worn(Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "wear": True}))
-    stage = follow_stage(worn, 0.0, np.array([0.02, 0.0]))
-    assert stage["reason"] == "invalid_input"
-    assert "exceeds the pin radius" in stage["detail"]
+@pytest.mark.parametrize(
+    ("solve", "opened", "reason", "words"),
+    [
+        ({"max_steps": 300}, 2e-4, "budget_steps", "300 steps"),
+        ({}, 0.02, "invalid_input", "exceeds the pin radius"),
+    ],
+)
+def test_a_stage_that_fails_ends_its_machine_with_a_reason(solve, opened, reason, words):
+    values = {**VALUES, "solve": VALUES["solve"] | solve, "wear": True}
+    worn = Worn(Case.from_values(values))
+    stage = follow_stage(worn, 0.0, np.array([opened, 0.0]))
+    assert stage["reason"] == reason
+    assert words in stage["detail"]
     assert worn.over(stage)
 
 

@@ -8,17 +8,12 @@ import xarray as xr
 
 from compressor.cases.case import Case
 from compressor.store.reader import read_store
-from compressor.studies.diagnosis.dataset import (
-    list_warnings,
-    make_data_set,
-    name_machine,
-    split_by_machine,
-)
+from compressor.studies.diagnosis import dataset
 
 
 @pytest.fixture(scope="module")
 def made(worn):
-    return make_data_set(worn, "worn")
+    return dataset.make_data_set(worn, "worn")
 
 
 def test_every_job_that_can_gives_windows(made):
@@ -38,7 +33,7 @@ def test_labels_are_those_of_the_case(made, worn):
         case = Case.from_attribute(stored.job(row["key"].item()).attrs["case"])
         assert row["joint"] == case.joint
         assert row["load"] == case.load
-        assert row["machine"] == name_machine(case)
+        assert row["machine"] == dataset.name_machine(case)
         assert row["speed_rpm"] == case.machine.speed_rpm
         assert row["rod_mass_kg"] == case.machine.rod_mass_kg
         worn_ends = {"none": (0, 0), "both": (0.1, 0.3)}.get(case.joint)
@@ -59,43 +54,44 @@ def test_no_machine_is_on_both_sides(made):
 def test_the_split_knows_no_order_and_keeps_shares():
     machines = [f"m{k}" for k in range(100) for _ in range(3)]
     strata = [("none", "both")[k < 40] for k in range(100) for _ in range(3)]
-    test = split_by_machine(machines, strata, 0.3, 5)
+    test = dataset.split_by_machine(machines, strata, 0.3, 5)
     assert test.sum() == 90
     assert sum(t for t, s in zip(test, strata, strict=True) if s == "both") == 36
     order = np.random.default_rng(1).permutation(300)
-    again = split_by_machine([machines[i] for i in order], [strata[i] for i in order], 0.3, 5)
+    again = dataset.split_by_machine(
+        [machines[i] for i in order], [strata[i] for i in order], 0.3, 5
+    )
     assert np.array_equal(again, test[order])
-    assert not np.array_equal(split_by_machine(machines, strata, 0.3, 6), test)
+    assert not np.array_equal(dataset.split_by_machine(machines, strata, 0.3, 6), test)
 
 
-def test_a_machine_is_what_is_built():
+SOLVE = {"duration_rev": 4, "settle_rev": 1}
+
+
+@pytest.mark.parametrize(
+    ("other", "is_same"),
+    [
+        ({"load": "gas"}, True), ({"machine": {"speed_rpm": 300}}, True), ({"name": "other"}, True),
+        ({"sensor": {"seed": 5}}, True), ({"solve": {**SOLVE, "accuracy": "draft"}}, True),
+        ({"clearance_mm": 0.21}, False), ({"machine": {"rod_mass_kg": 5}}, False),
+        ({"joint": "big_end"}, False), ({"body": {"mass_kg": 501}}, False),
+        ({"friction": False}, False),
+    ],
+)  # fmt: skip
+def test_a_machine_is_what_is_built(other, is_same):
     values = {"joint": "both", "clearance_mm": 0.2, "body": True, "sensor": {"seed": 4}}
-    solve = {"duration_rev": 4, "settle_rev": 1}
-    one = Case.from_values({**values, "solve": solve})
-    for other in (
-        {"load": "gas"}, {"machine": {"speed_rpm": 300}}, {"sensor": {"seed": 5}},
-        {"solve": {**solve, "accuracy": "draft"}}, {"name": "other"},
-    ):  # fmt: skip
-        assert name_machine(Case.from_values({**values, "solve": solve, **other})) == name_machine(
-            one
-        )
-    for other in (
-        {"clearance_mm": 0.21}, {"machine": {"rod_mass_kg": 5}}, {"joint": "big_end"},
-        {"body": {"mass_kg": 501}}, {"friction": False},
-    ):  # fmt: skip
-        assert name_machine(Case.from_values({**values, "solve": solve, **other})) != name_machine(
-            one
-        )
+    one, two = (Case.from_values(values | {"solve": SOLVE} | more) for more in ({}, other))
+    assert (dataset.name_machine(one) == dataset.name_machine(two)) == is_same
 
 
 def test_what_spoils_a_score_is_warned_of(made):
-    warnings = [*list_warnings(made)]
+    warnings = [*dataset.list_warnings(made)]
     assert warnings[0] == "too few machines to test on: both, none"
     assert "sound joints are ideal" in warnings[1]
-    clipped = [*list_warnings(made.assign_attrs(clipped_records=3, clipped_most=0.25))]
+    clipped = [*dataset.list_warnings(made.assign_attrs(clipped_records=3, clipped_most=0.25))]
     assert clipped[0].startswith("3 records are clipped at sensor.range_m_per_s2, at worst 25 %")
     fixed = json.loads(made.attrs["fixed"]) | {"healthy_clearance_mm": {"big_end": 0.1}}
-    assert len([*list_warnings(made.assign_attrs(fixed=json.dumps(fixed)))]) == 1
+    assert len([*dataset.list_warnings(made.assign_attrs(fixed=json.dumps(fixed)))]) == 1
 
 
 def test_the_command(made, worn, tmp_path, compsim):

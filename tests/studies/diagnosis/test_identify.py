@@ -16,13 +16,8 @@ STUDY = ("--study", "worn", "--quiet")
 
 
 @pytest.fixture(scope="module")
-def folder(worn_store):
-    return str(worn_store)
-
-
-@pytest.fixture(scope="module")
-def learned(folder):
-    library = identify.read_library(folder, "worn")
+def learned(worn_store):
+    library = identify.read_library(worn_store, "worn")
     return library, identify.Identifier.fit(library)
 
 
@@ -67,8 +62,8 @@ def test_a_library_holds_joints_clearances_features_and_what_else_is_swept(learn
     np.testing.assert_allclose(library.features[7], list(expected.values()), rtol=1e-9)
 
 
-def test_a_record_is_explained(record, folder, compsim):
-    out = compsim("identify", record, *STUDY, "-r", folder).out
+def test_a_record_is_explained(record, worn_store, compsim):
+    out = compsim("identify", record, *STUDY, "-r", worn_store).out
     first, head, best, *_, last, _ = out.splitlines()
     assert first.startswith(f"{record}: ")
     assert "revolutions at 500 rpm, 8000 Hz" in first
@@ -81,18 +76,18 @@ def test_a_record_is_explained(record, folder, compsim):
     assert last.split() == ["varied", "machine.rod_mass_kg"]
 
 
-def test_an_exported_job_is_explained_as_the_job_itself(tmp_path, folder, compsim):
-    key, path = sorted(read_store(folder).keys())[5], str(tmp_path / "job.csv")
-    compsim("export", key, "-r", folder, "-o", path)
+def test_an_exported_job_is_explained_as_the_job_itself(tmp_path, worn_store, compsim):
+    key, path = sorted(read_store(worn_store).keys())[5], str(tmp_path / "job.csv")
+    compsim("export", key, "-r", worn_store, "-o", path)
     answers = []
     for record in (key, path):
-        found = json.loads(compsim("identify", record, *STUDY, "-r", folder, "--json").out)
+        found = json.loads(compsim("identify", record, *STUDY, "-r", worn_store, "--json").out)
         answers.append({one["joint"]: one["probability"] for one in found["candidates"]})
     assert answers[1] == pytest.approx(answers[0], abs=0.05)  # by itself it is left out
     assert max(answers[1], key=answers[1].get) == max(answers[0], key=answers[0].get)
 
 
-def test_what_a_file_does_not_say_options_do(tmp_path, folder, compsim):
+def test_what_a_file_does_not_say_options_do(tmp_path, worn_store, compsim):
     """The same record as whole numbers of WAV, in g, its tacho a quarter of a turn late."""
     times, values, tacho = struck("big_end", [0.3], 5002)
     as_csv = written(tmp_path / "bare.csv", times, values, tacho, wave=False)
@@ -104,25 +99,25 @@ def test_what_a_file_does_not_say_options_do(tmp_path, folder, compsim):
              "--tacho-deg", "90"]  # fmt: skip
     chances, steady = [], ["--rpm", "500", "--tdc", "0"]
     for words in ([as_csv, *steady], [str(tmp_path / "record.wav"), *hints]):
-        found = json.loads(compsim("identify", *words, *STUDY, "-r", folder, "--json").out)
+        found = json.loads(compsim("identify", *words, *STUDY, "-r", worn_store, "--json").out)
         best = found["candidates"][0]
         chances.append(best["probability"])
         assert best["joint"] == "big_end"
     assert chances[1] == pytest.approx(chances[0], abs=0.01)
 
 
-def test_what_does_not_fit_is_said_first(tmp_path, folder, compsim):
+def test_what_does_not_fit_is_said_first(tmp_path, worn_store, compsim):
     times, values, tacho = struck("none", [], 5003)
     values += 30 * np.sin(2 * np.pi * 300 * times)
     path = written(tmp_path / "hum.csv", times, values, tacho)
-    lines = compsim("identify", path, *STUDY, "-r", folder).out.splitlines()
+    lines = compsim("identify", path, *STUDY, "-r", worn_store).out.splitlines()
     assert lines[1].startswith("NOTHING IN THIS STUDY FITS: ")
     assert lines[2].startswith("compare noise (sensor.noise_m_per_s2), unit (g read as m/s2 is")
 
 
-def test_without_scikit_learn_it_says_how_to_get_it(record, folder, compsim, monkeypatch):
+def test_without_scikit_learn_it_says_how_to_get_it(record, worn_store, compsim, monkeypatch):
     monkeypatch.setattr("compsim.identify.find_spec", lambda name: None)
-    err = compsim("identify", record, *STUDY, "-r", folder, code=2).err
+    err = compsim("identify", record, *STUDY, "-r", worn_store, code=2).err
     assert "needs scikit-learn: pip install 'compsim[learn]'" in err
 
 
@@ -137,6 +132,6 @@ def test_without_scikit_learn_it_says_how_to_get_it(record, folder, compsim, mon
         ("RECORD --study worn --channel room", "--channel room: no channel of"),
     ],
 )  # fmt: skip
-def test_mistakes_are_named(words, told, record, folder, compsim):
+def test_mistakes_are_named(words, told, record, worn_store, compsim):
     words = [record if word == "RECORD" else word for word in words.split()]
-    assert told in compsim("identify", *words, "-r", folder, code=2).err
+    assert told in compsim("identify", *words, "-r", worn_store, code=2).err

@@ -5,14 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from compressor.studies.diagnosis.features import (
-    BANDS,
-    BEATS,
-    FEATURES,
-    SECTORS,
-    SMALLEST,
-    features,
-)
+from compressor.studies.diagnosis import features
+from compressor.studies.diagnosis.features import BANDS, BEATS, FEATURES, SECTORS, SMALLEST
 from compressor.vibration import Record, RecordError
 
 RATE, SPEED, WHOLE = 25600.0, 8.0, 10  # Hz, rev/s, revolutions
@@ -25,7 +19,7 @@ SILENT = math.log10(SMALLEST)
 
 
 def describe(times, values, tacho):
-    return features(Record(times, values, tacho, math.nan))
+    return features.features(Record(times, values, tacho, math.nan))
 
 
 def sine(order, amplitude=1.0):

@@ -20,9 +20,7 @@ def made(count, seed, equal=False, joints=JOINTS):
     clearances = 0.05 * 10 ** rng.random((count, 2))
     if equal:
         clearances[:, 1] = clearances[:, 0]
-    worn = np.column_stack(
-        [np.isin(told, ["big_end", "both"]), np.isin(told, ["small_end", "both"])]
-    )
+    worn = np.column_stack([np.isin(told, [end, "both"]) for end in ("big_end", "small_end")])
     clearances = np.where(worn, clearances, 0.0)
     depth = np.where(worn, np.log(np.where(worn, clearances, 1.0) / 0.15), 0.0)
     hidden = np.column_stack([worn, depth])
@@ -124,10 +122,8 @@ def test_intervals_are_wide_where_errors_are_great():
     logs = rng.uniform(-3.0, 0.0, 400)
     points = (logs + rng.normal(0, 1.0, 400) * 0.1 * (3.2 + logs))[:, None]
     found = identify.Clearance.fit(points, logs[:, None], np.arange(400))
-    widths = [
-        np.log(one.high / one.low) for (one,) in map(found.locate, np.array([[-2.7], [-0.5]]))
-    ]
-    assert widths[1] > 2.5 * widths[0]
+    (small,), (large,) = map(found.locate, np.array([[-2.7], [-0.5]]))
+    assert np.log(large.high / large.low) > 2.5 * np.log(small.high / small.low)
 
 
 def test_a_machine_is_judged_by_others_alone():
@@ -137,7 +133,5 @@ def test_a_machine_is_judged_by_others_alone():
         assert not {*machines[others]} & {*machines[own]}
         assert {*labels[others]} == {"none", "both"}
     # of one sound machine each job stands for itself
-    assert (
-        len(identify.split_into_folds(labels, np.where(labels == "none", 0, machines)))
-        == identify.FOLDS
-    )
+    one = identify.split_into_folds(labels, np.where(labels == "none", 0, machines))
+    assert len(one) == identify.FOLDS
