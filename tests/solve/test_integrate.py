@@ -10,6 +10,8 @@ from compressor.cases.case import Case
 from compressor.cases.groups import METHODS
 from compressor.cases.parameter import ACCURACY
 from compressor.physics.record import FREEDOMS
+from compressor.physics.systems import derivative_with_flows
+from compressor.solve import scipy_driver
 from compressor.solve.run import CHUNK, COMPILED, split_segments
 from compressor.solve.si_record import absolute_tolerances, record, scene
 from compressor.solve.simulate import measure, simulate
@@ -68,6 +70,25 @@ def test_energy_residual_of_every_method(joint, method):
     found = run(joint, 0.3, duration_rev=span, settle_rev=0, rtol=1e-5, method=method)
     assert str(found["status"].values) == "ok"
     assert 0 < float(found["energy_residual"]) <= residual_bound(found, revolutions=1)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("method", [name for name in METHODS if name not in COMPILED])
+@pytest.mark.parametrize(("rates", "value"), [(slice(-2, -1), 0.0), (slice(None), np.nan)])
+def test_a_run_that_loses_damping_s_work_or_its_motion_fails(rates, value, method, monkeypatch):
+    def lost(t, z, phase, p, out):
+        derivative_with_flows(t, z, phase, p, out)
+        out[rates] = value
+
+    monkeypatch.setattr(scipy_driver, "derivative_with_flows", lost)
+    found = run("big_end", 0.3, duration_rev=0.1, settle_rev=0, rtol=1e-5, method=method)
+    if value == 0.0:
+        assert found["reason"] == "energy_audit_failed"
+        return
+    assert found["reason"] in ("non_finite", "step_underflow")
+    assert found.attrs["stop_time"] == 0.0
+    assert found.attrs["stop_state"].size == 4
+    assert np.isfinite(found["acceleration"]).sum() == 1  # where it began
 
 
 def test_methods_agree_beyond_a_corner():
