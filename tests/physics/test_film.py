@@ -27,12 +27,6 @@ def record_of(ratio=1.0, share=0.02):
     return record(Case.from_values(values))
 
 
-def unit_force():
-    """The film's force for a Sommerfeld number of 1, at a speed of 1 rad/s."""
-    p, pin = record_of(), record_of()["pin_radius"][0]
-    return p["viscosity"] * p["film_length"][0] * 2 * pin * (pin / CLEARANCE) ** 2
-
-
 def force(e, rate=(0.0, 0.0), spins=(SPEED, 0.0), p=None):
     return np.array(film(0, (*e, *rate), spins, record_of() if p is None else p))
 
@@ -133,7 +127,9 @@ def test_forces_are_smooth_in_the_place(begin, end):
 
 def test_beyond_the_wall_the_film_stays_what_it_is_in_the_middle_of_its_last_share():
     """So that film and dry contact together never bear less for being pressed deeper."""
-    exact = unit_force() * SPEED * 0.99 * math.hypot(*reynolds(0.99, 1.0))
+    p, pin = record_of(), record_of()["pin_radius"][0]
+    unit = p["viscosity"] * p["film_length"][0] * 2 * pin * (pin / CLEARANCE) ** 2
+    exact = unit * SPEED * 0.99 * math.hypot(*reynolds(0.99, 1.0))
     assert math.hypot(*force((CLEARANCE, 0.0))[:2]) == pytest.approx(exact, rel=5e-3)
     for radial, turning in ((0.0, 0.0), (0.01, 0.0), (-0.01, 400.0)):
         found = [
@@ -141,17 +137,6 @@ def test_beyond_the_wall_the_film_stays_what_it_is_in_the_middle_of_its_last_sha
             for depth in (1.0, 1.000001, 1.01, 1.1)
         ]
         np.testing.assert_allclose(found, found[:1] * len(found), rtol=1e-9)
-
-
-def both_at_once(p, eps, angle):
-    """Numbers of the film at a direction of its velocity: the model's, Reynolds'."""
-    ratio = 0.5 * p["film_length"][0] / p["pin_radius"][0]
-    turning, closing = math.cos(angle), math.sin(angle)
-    rate = (closing * CLEARANCE, 0.0)
-    fx, fy = force((eps * CLEARANCE, 0.0), rate, (turning / eps, 0.0), p)[:2]
-    ours = np.array([-fx, fy]) * CLEARANCE**2
-    ours /= 2.0 * p["film_length"][0] * p["pin_radius"][0] ** 3 * p["viscosity"]
-    return ours, reynolds(eps, ratio, turning, closing)
 
 
 @pytest.mark.parametrize(
@@ -187,10 +172,14 @@ def test_the_film_in_all_directions_is_near_to_reynolds(eps, pressed, apart):
     """Relative where it is pressed; where it is pulled apart, of the force of turning alone."""
     errors = [], []
     for ratio in (0.25, 1.0):
-        p = record_of(ratio)
-        turning = np.linalg.norm(reynolds(eps, ratio, 1.0, 0.0))
+        p, turning = record_of(ratio), np.linalg.norm(reynolds(eps, ratio, 1.0, 0.0))
+        size_of_force = 2.0 * p["film_length"][0] * p["pin_radius"][0] ** 3 * p["viscosity"]
         for angle in np.radians([*np.arange(0.0, 360.0, 22.5), 350.0, 355.0, 357.5]):
-            ours, exact = both_at_once(p, eps, angle)
+            wedge, closing = math.cos(angle), math.sin(angle)
+            rate = (closing * CLEARANCE, 0.0)
+            fx, fy = force((eps * CLEARANCE, 0.0), rate, (wedge / eps, 0.0), p)[:2]
+            ours = np.array([-fx, fy]) * CLEARANCE**2 / size_of_force
+            exact = reynolds(eps, ratio, wedge, closing)
             back = int(angle > 3.15)
             size = turning if back else np.linalg.norm(exact)
             errors[back].append(100.0 * np.linalg.norm(ours - exact) / size)

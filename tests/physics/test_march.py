@@ -1,47 +1,33 @@
 """The compiled loop: resumable to the bit, lands on corners, and misses no contact."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import reference
+from test_invariances import accelerations
+from test_invariances import request as request_of
 
-from compressor.cases.case import Case
 from compressor.physics.loads import segments
 from compressor.physics.march import Status, march, new_stepper, new_work
 from compressor.physics.observe import COLUMNS, Column
-from compressor.physics.record import FREEDOMS
 from compressor.physics.runge_kutta import FLOWS
 from compressor.physics.step_control import Mode
-from compressor.physics.systems import observe_all, start
+from compressor.physics.systems import observe_all
 from compressor.physics.tally import new_tally
 from compressor.solve import run as run_module
-from compressor.solve.request import Request
 from compressor.solve.run import integrate
-from compressor.solve.si_record import natural_sizes, offsets, record, scene
+from compressor.solve.si_record import natural_sizes
 
 PULSES = {"load": "gas", "machine": {"rod_mass_kg": 3, "reciprocating_mass_kg": 6}}
 
 
-def request(rtol, duration=None, **values):
-    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, **values})
-    p = record(case)
-    y = np.zeros(2 * FREEDOMS[scene(case)])
-    start(offsets(case), y, p)
-    times = (duration or case.duration) * np.arange(1201) / 1200
-    return Request(p, y, times, 0.0, rtol, max_steps=10_000)
-
-
-def accelerations(found, p):
-    rows = np.empty((found.times.size, COLUMNS))
-    observe_all(found.times, found.states, found.phases, p, rows)
-    return rows[:, Column.ACCELERATION]
+def request(rtol, turns=4, samples=1200, **values):
+    return request_of({"joint": "big_end", "clearance_mm": 0.2, **values}, rtol, turns, samples)
 
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
 def test_chunks_change_nothing(joint, monkeypatch):
-    asked = request(1e-5, 0.12, joint=joint)
+    asked = request(1e-5, 1, joint=joint)
     whole = integrate(asked)
     monkeypatch.setattr(run_module, "CHUNK", 7)
     chunked = integrate(asked)
@@ -73,10 +59,10 @@ def test_a_corner_costs_no_step_that_is_refused():
 @pytest.mark.parametrize("load", ["gas", "spring"])
 def test_a_peak_after_settling_is_the_dense_solutions(load):
     """Steps are looked at closely where a peak may be beaten; else it is found 2e-3 too low."""
-    asked = request(1e-5, joint="small_end", load=load)
-    times = np.linspace(0.0, 0.12, 40_001)
-    found = integrate(replace(asked, times=times, settle=0.04))
-    late = np.abs(accelerations(found, asked.p))[times >= 0.0405]
+    asked = request(1e-5, 1, 40_000, joint="small_end", load=load)
+    asked.settle = 0.04
+    found = integrate(asked)
+    late = np.abs(accelerations(asked.p, found))[asked.times >= 0.0405]
     # of 41 tolerances about this one the worst is 4.6e-4 off; which is, is a matter of rounding
     assert found.tally["peak"][0] == pytest.approx(late.max(), rel=6e-4)
 
@@ -92,8 +78,7 @@ def test_known_pulses_are_found(clearance, begin, end, rtol):
 
     At 6e-4 and above there are motions that have no such pulse.
     """
-    asked = request(rtol, 0.012, clearance_mm=clearance, **PULSES)
-    asked.times = np.linspace(0, 0.012, 48001)
+    asked = request(rtol, 0.1, 48000, clearance_mm=clearance, **PULSES)
     found = integrate(asked)
     rows = np.empty((asked.times.size, COLUMNS))
     observe_all(asked.times, found.states, found.phases, asked.p, rows)
@@ -108,7 +93,7 @@ def test_pulses_decide_the_accuracy(clearance):
         "gas", "big_end", clearance * 1e-3, rod_mass=3.0, rod_inertia=3 * 0.36 / 12,
         reciprocating_mass=6.0,
     )  # fmt: skip
-    asked = request(1e-7, 0.012, clearance_mm=clearance, **PULSES)
+    asked = request(1e-7, 0.1, clearance_mm=clearance, **PULSES)
     truth = reference.reference_solution(params, "big_end", asked.times, rtol=1e-10)["a"]
-    found = accelerations(integrate(asked), asked.p)
+    found = accelerations(asked.p, integrate(asked))
     assert np.linalg.norm(found - truth) / np.linalg.norm(truth) < 1e-4
