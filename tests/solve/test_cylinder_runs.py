@@ -4,20 +4,15 @@ import numpy as np
 import pytest
 from cylinder_made import DOUBLE, MACHINE, pressures
 from test_feature_runs import apart
-
-from compressor.cases.case import Case
-from compressor.solve.simulate import simulate
+from test_feature_runs import run as run_whole
 
 HEAVY = MACHINE | {"reciprocating_mass_kg": 30}
 WORN = {"joint": "small_end", "clearance_mm": 0.2}
 
 
 def run(more, **solve):
-    how = {"duration_rev": 1, "settle_rev": 0, "error_bars": False, **solve}
-    values = {"load": "gas", "machine": HEAVY, "gas": DOUBLE, **WORN, **more, "solve": how}
-    found = simulate(Case.from_values(values))
-    assert found.status == "ok", found.attrs.get("detail")
-    return found
+    values = {"load": "gas", "machine": HEAVY, "gas": DOUBLE, **WORN, **more}
+    return run_whole(values, **{"duration_rev": 1, **solve})
 
 
 def test_errors_fall_with_the_tolerance():

@@ -4,6 +4,7 @@ import itertools
 import math
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,6 @@ from compressor.metrics import METRICS, SERIES
 from compressor.outcome import Regime
 from compressor.physics import COLUMNS, Column
 from compressor.solve import search as search_module
-from compressor.solve.request import Trajectory
 from compressor.solve.search import (
     LOOK_RTOL,
     LOOK_SHIFT,
@@ -117,19 +117,10 @@ def test_a_tolerance_promises_nothing_and_is_searched_by_its_bars():
     assert found.attributes["regime"] == "periodic"
 
 
-def run_of(evaluations, **ended):
-    """A run that took so many evaluations, six for a step."""
-    none = np.empty(0)
-    return Trajectory(
-        none, none, none, None, steps=evaluations // 6, evaluations=evaluations, **ended
-    )
-
-
-def searched(of, *runs):
-    """A search beside runs of so many evaluations."""
+def searched(of, evaluations):
+    """A search beside a run of so many evaluations, six for a step."""
     search = Search(of)
-    for evaluations in runs:
-        search.count(run_of(evaluations))
+    search.count(SimpleNamespace(evaluations=evaluations, steps=evaluations // 6, rejected=0))
     return search
 
 
@@ -147,9 +138,6 @@ def compared(monkeypatch, *found, needs=1000):
     return asked
 
 
-TIGHTER = pytest.approx(LOOK_RTOL / SURE_FACTOR)
-
-
 def test_motions_that_part_at_a_loose_tolerance_alone_are_no_chaos(monkeypatch):
     """Nor is it known that they never part."""
     of = case()
@@ -159,7 +147,10 @@ def test_motions_that_part_at_a_loose_tolerance_alone_are_no_chaos(monkeypatch):
     assert not search.parts(whole=True)
     assert math.isnan(search.horizon)
     assert not search.stopped
-    assert [row[:2] for row in asked] == [(4.0, LOOK_RTOL), (pytest.approx(0.15), TIGHTER)]
+    assert [row[:2] for row in asked] == [
+        (4.0, LOOK_RTOL),
+        (pytest.approx(0.15), pytest.approx(LOOK_RTOL / SURE_FACTOR)),
+    ]
 
 
 @pytest.mark.parametrize("needs", [1000, 12_000_000, 10**9])
@@ -209,22 +200,21 @@ def samples(of, shape):
     return rows
 
 
-@pytest.mark.parametrize("period", [1, 2, 3])
-def test_a_period_is_found_in_revolutions(period):
+@pytest.mark.parametrize(
+    ("shape", "error", "found"),
+    [
+        (lambda turns: np.sin(2 * np.pi * turns) + 2, 0.0, (1, 1.0)),
+        (lambda turns: np.sin(np.pi * turns) + 2, 0.0, (2, 1.0)),
+        (lambda turns: np.sin(2 * np.pi / 3 * turns) + 2, 0.0, (3, 1.0)),
+        (lambda turns: np.cos(2 * np.pi * turns) + 10.0 ** (-2 * turns), 1e-6, (1, 3.0)),
+        (lambda turns: np.cos(2 * np.pi * turns) + 10.0 ** (-2 * turns), 1e-2, (1, 1.0)),
+        (lambda turns: np.cos(2 * np.pi * turns) + 0.1 * turns, 1e-3, (None, math.nan)),
+    ],
+)
+def test_a_period_is_found_in_revolutions_from_where_a_motion_has_settled(shape, error, found):
     of = case(duration_rev=8)
-    rows = samples(of, lambda turns: np.sin(2 * np.pi * turns / period) + 2)
-    assert repeats(of, rows, NO_ERRORS) == (period, 1.0)
-
-
-def test_a_motion_repeats_itself_from_where_it_has_settled():
-    of = case(duration_rev=8)
-    decay = samples(of, lambda turns: np.cos(2 * np.pi * turns) + 10.0 ** (-2 * turns))
-    assert repeats(of, decay, NO_ERRORS | {"acceleration": 1e-6}) == (1, 3.0)
-    assert repeats(of, decay, NO_ERRORS | {"acceleration": 1e-2}) == (1, 1.0)
-    drift = samples(of, lambda turns: np.cos(2 * np.pi * turns) + 0.1 * turns)
-    period, since = repeats(of, drift, NO_ERRORS | {"acceleration": 1e-3})
-    assert period is None
-    assert math.isnan(since)
+    told = repeats(of, samples(of, shape), NO_ERRORS | {"acceleration": error})
+    np.testing.assert_equal(told, found)
 
 
 @pytest.mark.parametrize(("duration", "settle"), [(0.5, 0), (1.5, 1), (2.9, 1)])

@@ -36,11 +36,6 @@ def turns(rng, count, pull=0.0):
     return found
 
 
-def poisson_upper(count):
-    """The exact upper end of the 95 % interval of a Poisson mean (Garwood, Biometrika 28, 1936)."""
-    return stats.chi2.ppf(0.975, 2 * count + 2) / 2
-
-
 @pytest.fixture
 def record():
     p = new_record()
@@ -103,7 +98,7 @@ def test_batches_that_agree_by_chance_say_nothing(record):
 
 
 def test_the_least_bar_of_a_count_is_that_of_a_poisson_one():
-    """The mean of which a count lies at the lower 2.5 % quantile is within it, to a tenth."""
+    """To a tenth: the exact upper end of a 95 % interval (Garwood, Biometrika 28, 1936)."""
     for count in (0, 1, 5, 24, 1000):
-        upper = poisson_upper(count)
+        upper = stats.chi2.ppf(0.975, 2 * count + 2) / 2
         assert count_bar(np.array(count)) == pytest.approx(upper - count, rel=0.1, abs=0.2)

@@ -56,11 +56,6 @@ def test_a_cubic_is_exact_at_any_step(step):
     np.testing.assert_allclose(found.displacement, expected, atol=1e-9 * np.abs(shape).max())
 
 
-def test_what_no_oscillator_takes():
-    with pytest.raises(ValueError, match="between 0 and 1, not at 1"):
-        oscillate(np.ones(9), 4e-5, FREQUENCY, 1.0)
-
-
 # ---- the body
 
 STEP, COUNT = 1e-4, 4001

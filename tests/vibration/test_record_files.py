@@ -14,6 +14,7 @@ VALUES = np.sin(50 * TIMES)
 PULSES = np.array([0.0375, 0.1375, 0.2375, 0.3375, 0.4375])
 COLUMNS = record_columns(TIMES, VALUES, PULSES)
 STEADY = {"rpm": 60 / TURN, "tdc": PULSES[2]}
+USUAL = "time_s,acceleration_m_per_s2"
 
 
 def voltage(times=TIMES):
@@ -23,12 +24,10 @@ def voltage(times=TIMES):
 
 @pytest.fixture
 def written(tmp_path):
-    """Writes columns, or lines, as CSV."""
+    """Writes columns as CSV."""
 
-    def write(columns, header="time_s,acceleration_m_per_s2,tacho", change=None):
+    def write(columns, header=f"{USUAL},tacho"):
         lines = [",".join(map(repr, map(float, row))) for row in zip(*columns, strict=True)]
-        for number, line in (change or {}).items():
-            lines[number - 2] = line
         path = tmp_path / "record.csv"
         path.write_text("\n".join([header, *lines]) + "\n", encoding="utf-8")
         return path
@@ -72,12 +71,10 @@ def test_a_tacho_that_chatters_at_its_middle_counts_once(written):
 
 
 def test_a_steady_speed_stands_in_for_a_tacho(written):
-    path = written([TIMES, VALUES], "time_s,acceleration_m_per_s2")
-    found = read_record(path, rpm=60 / TURN, tdc=PULSES[2])
+    found = read_record(written([TIMES, VALUES], USUAL), **STEADY)
     np.testing.assert_allclose(found.tacho, PULSES, atol=1e-12)
 
 
-USUAL = "time_s,acceleration_m_per_s2"
 ONE = {"channel": "1", "unit": "g"}
 CHANNELS = [TIMES, VALUES, VALUES, voltage()]
 BROKEN = np.where(np.arange(450) == 16, np.nan, VALUES)
@@ -166,13 +163,12 @@ def test_records_of_every_type_are_read(suffix, hints, error, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("dtype", "full", "scale"),
-    [(np.int16, 2**15, 1.0), (np.int32, 2**31, 1.0), (np.uint8, 2**7, 128.0)],
+    ("dtype", "full", "zero"), [(np.int16, 2**15, 0), (np.int32, 2**31, 0), (np.uint8, 2**7, 128)]
 )
-def test_whole_numbers_of_wav_are_shares_of_the_full_scale(dtype, full, scale, tmp_path):
+def test_whole_numbers_of_wav_are_shares_of_the_full_scale(dtype, full, zero, tmp_path):
     """A sample of half the full scale is half of what the greatest means."""
     path = tmp_path / "x.wav"
-    half = np.where(TIMES < 0.2, 0.5, -0.25) * full + (128 if dtype == np.uint8 else 0)
+    half = np.where(TIMES < 0.2, 0.5, -0.25) * full + zero
     wavfile.write(path, 1000, half.astype(dtype))
     found = read_record(path, unit="g", full_scale=50.0, **STEADY).values
     np.testing.assert_array_equal(found, np.where(TIMES < 0.2, 25.0, -12.5) * 9.80665)
@@ -225,16 +221,13 @@ def test_columns_of_other_names_are_chosen(written):
 GERMAN = "Analyser: PRO-4000\nSerial;12\n\nTime [ms];Acc [g];Keyphasor [V]\n"
 
 
-def analyser_text():
-    rows = zip(1e3 * TIMES, VALUES / 9.80665, voltage(), strict=True)
-    return GERMAN + "".join(f"{t:.6f};{a:.9f};{v:.6f}\n".replace(".", ",") for t, a, v in rows)
-
-
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
 def test_a_record_as_analysers_write_it_is_read(encoding, tmp_path):
     """Semicolons, decimal commas, lines above the header, ms, g, and a keyphasor."""
     path = tmp_path / "plant.csv"
-    path.write_text(analyser_text(), encoding=encoding)
+    rows = zip(1e3 * TIMES, VALUES / 9.80665, voltage(), strict=True)
+    lines = [f"{t:.6f};{a:.9f};{v:.6f}\n".replace(".", ",") for t, a, v in rows]
+    path.write_text(GERMAN + "".join(lines), encoding=encoding)
     found = read_record(path)
     np.testing.assert_allclose(found.times, TIMES, atol=1e-12)
     np.testing.assert_allclose(found.values, VALUES, atol=1e-7)
@@ -248,18 +241,12 @@ def test_a_record_as_analysers_write_it_is_read(encoding, tmp_path):
     assert other.remarks[1].endswith("the file says g, taken as --unit m/s2 says")
 
 
-def uneven_times(share, drift):
-    """Times whose steps differ by a share, at random, and slowly."""
-    count = TIMES.size
-    steps = 1.0 + share * np.random.default_rng(2).uniform(-1, 1, count)
-    steps += drift * np.sin(np.linspace(0, 2 * np.pi, count))
-    return np.cumsum(steps / RATE)
-
-
 @pytest.mark.parametrize(("share", "drift"), [(0.05, 0.0), (0.002, 0.0), (0.0, 0.08)])
 def test_samples_at_uneven_times_are_put_on_equal_ones(share, drift, written):
     """As the sine is at those times; as if steps were equal, it is wrong by up to its size."""
-    times = uneven_times(share, drift)
+    steps = 1.0 + share * np.random.default_rng(2).uniform(-1, 1, TIMES.size)
+    steps += drift * np.sin(np.linspace(0, 2 * np.pi, TIMES.size))
+    times = np.cumsum(steps / RATE)
     found = read_record(written([times, np.sin(50 * times), voltage(times)]))
     assert np.ptp(np.diff(found.times)) < 1e-12
     np.testing.assert_allclose(found.values, np.sin(50 * (times[0] + found.times)), atol=1e-5)

@@ -13,17 +13,15 @@ HALF = 0.5 / RATE
 def course(kind, count, rng):
     """Revolution times of a machine, in TURN, (count - 1,)."""
     place = np.arange(count - 1)
-    return (
-        1.0
-        + {
-            "steady": 0.0 * place,
-            "jitter": 0.002 * rng.normal(size=count - 1),
-            "small jitter": 0.0001 * rng.normal(size=count - 1),
-            "running down": 0.02 * place,
-            "hunting": 0.01 * np.sin(2 * np.pi * place / 5),
-            "fast hunting": 0.001 * np.sin(2 * np.pi * place / 2.3),
-        }[kind]
-    )
+    deviations = {
+        "steady": 0.0 * place,
+        "jitter": 0.002 * rng.normal(size=count - 1),
+        "small jitter": 0.0001 * rng.normal(size=count - 1),
+        "running down": 0.02 * place,
+        "hunting": 0.01 * np.sin(2 * np.pi * place / 5),
+        "fast hunting": 0.001 * np.sin(2 * np.pi * place / 2.3),
+    }
+    return 1.0 + deviations[kind]
 
 
 def errors(kind, count):
