@@ -112,12 +112,8 @@ def made_windows(sound=20, draws=10):
     return Windows(joints, clearances, drawn, drawn, {(0, RECORD): readings}, 0)
 
 
-@pytest.fixture(scope="module")
-def judged():
-    return alarms.judge_windows(made_windows(), (0.0,), 0.05)
-
-
-def test_rates_of_made_up_windows_are_known(judged):
+def test_rates_of_made_up_windows_are_known():
+    judged = alarms.judge_windows(made_windows(), (0.0,), 0.05)
     one = judged.isel(noise=0).sel(alarm="rms, record")
     assert one["clearance"].values.tolist() == [*LEVELS]
     assert one["detection"].sel(end="value").values.tolist() == [0.0, 0.5, 1.0]

@@ -80,12 +80,6 @@ def test_every_machine_of_the_examples_has_all_cases(name):
     assert len(found) * 11 == study.jobs
 
 
-def ishigami(points):
-    """Ishigami and Homma's function with a = 7 and b = 0.1, scaled below 1."""
-    x, y, z = (2.0 * np.pi * column - np.pi for column in points.T)
-    return (np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)) / 20.0
-
-
 KEYS = ("rod_mass_kg", "static", "dynamic")
 
 
@@ -93,7 +87,8 @@ def test_the_indices_of_ishigami_s_function():
     """By Saltelli's closed forms: first order .3139, .4424, 0; total .5576, .4424, .2437."""
     points = np.array(design("saltelli", 512, 3, 1))
     margin = np.full((len(points), 8), 0.5)
-    margin[:, 2] = ishigami(points)
+    x, y, z = (2.0 * np.pi * column - np.pi for column in points.T)
+    margin[:, 2] = (np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)) / 20.0  # below 1
     columns = zip(KEYS, points.T, strict=True)
     coords = {name: ("machine", column, {"case_key": name}) for name, column in columns}
     drawn = machines_of(margin, coords)

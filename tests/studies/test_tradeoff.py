@@ -312,14 +312,10 @@ def model_changes():
     return data
 
 
-def cells(table):
-    titles = [measure.title for measure in table.measures]
-    return {row.name: dict(zip(titles, row.cells, strict=True)) for row in table.rows}
-
-
 def test_a_change_is_what_lies_beyond_both_bars():
     table = model_table(model_changes())
-    found = cells(table)
+    titles = [measure.title for measure in table.measures]
+    found = {row.name: dict(zip(titles, row.cells, strict=True)) for row in table.rows}
     peak, rms = "peak acceleration", "rms acceleration"
     depth, loss = "max penetration, big end", "time without dry contact, big end"
     assert [*found["softer"]] == [peak, rms, depth, loss]
