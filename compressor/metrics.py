@@ -203,7 +203,7 @@ TABLE = (
         "peak_rod_load_tension", (), "N", "greatest pull of the rod load at the crosshead pin",
         # twice the usual: where valves open within a step, two runs agreed better than they were
         # right, by 1.6 bars at worst of two machines; judged by 58 others, whose errors are at most
-        # 0.52 bars (tests/campaigns/measure_rod_load.py --seed 2026)
+        # 0.52 bars
         "contact_force", Bar(10.0, 0.6), Shown("peak rod load, tension", "kN", 1e-3),
         kind="greatest", when="signals", joint=1,
         made=lambda t: t.side_peak[0],

@@ -64,9 +64,10 @@ def page():
     for title, names in SECTIONS.items():
         parts.append(f"## {title}\n")
         parts.append("".join(entry(name, getattr(compressor, name)) for name in names))
-    methods = [pair for pair in members(compressor.Case) if not isinstance(pair[1], PROPERTIES)]
-    parts.append("`Case` has these methods, and properties that `help` lists:\n")
-    parts.append("".join(entry(f"Case.{name}", made) for name, made in methods))
+        if "Case" in names:
+            own = [pair for pair in members(compressor.Case) if not isinstance(pair[1], PROPERTIES)]
+            parts.append("`Case` has these methods, and properties that `help` lists:\n")
+            parts.append("".join(entry(f"Case.{name}", made) for name, made in own))
     return "\n".join(parts)
 
 

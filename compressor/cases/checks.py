@@ -126,8 +126,9 @@ DIAMETERS = (
 )
 DIAMETER = re.compile(r"(?i)(\w*_)?(diameter|diametral|dia)(_\w*)?")
 BACK_AND_FORTH = re.compile(
-    r"(\w*_)?(piston|crosshead|plunger|reciprocating)(_\w*)?_(mass|weight)(_\w*)?"
+    r"(\w*_)?(piston|crosshead|plunger|reciprocating|wrist_?pin|gudgeon_?pin)(_\w*)?_mass(_[a-z]+)?"
 )
+WEIGHT = re.compile("(?<!counter)(?<!counter_)(?<!balance_)weight")  # a mass, in kg
 PERCENT = re.compile(r"(\w*_)?clearance(_\w*)?_(percent|pct)")
 TWICE = "stands in place of {}: give one of the two"
 
@@ -161,7 +162,9 @@ def expand_synonyms(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Pro
 def in_our_unit(name: str, value: Any, allowed: list[str]) -> str:
     """Return the hint at a key in another unit, such as "; write suction_MPa: 0.2"; or ""."""
     stem, _, unit = name.rpartition("_")
-    for known in (stem, stem.removesuffix("_pressure")) if unit in OTHER_UNITS else ():
+    if unit not in OTHER_UNITS or stem.endswith("_per"):
+        return ""
+    for known in (stem, stem.removesuffix("_pressure")):
         if known and (ours := f"{known}_{WRITTEN[OTHER_UNITS[unit][0]]}") in allowed:
             return f"; write {ours}: {convert_other(value, unit)}"
     return ""
@@ -202,7 +205,7 @@ def describe_wrong(group: str, name: str, value: Any) -> str:
     """Return the error of an unknown key of a case's group; without a name of what is no group."""
     if not name:
         return no_mapping(group, value)
-    value = to_python(value)
+    value, name = to_python(value), WEIGHT.sub("mass", name)
     known, doubles = known_keys(group), [key for key in DOUBLES if key.startswith(f"{group}.")]
     hint = (
         in_our_unit(name, value, [*known, *map(_leaf, doubles)])
@@ -249,9 +252,9 @@ def probable_keys(name: str, group: str) -> list[str]:
     every = [*keys_of(lambda key: key), *DOUBLES]
     if exact := [key for key in every if _leaf(key) == name]:
         return exact
-    name = re.sub("(?<!counter)weight", "mass", name)
-    doubles = [_leaf(key) for key in DOUBLES if group and key.startswith(f"{group}.")]
-    near = _nearest(name, [*known_keys(group), *doubles], 0.6)
+    if "rotating_mass" in name:
+        return []  # which no key has
+    near = _nearest(name, known_keys(group), 0.6)
     if near:
         return [f"{group}.{near}".lstrip(".")]
     own = [key for key in every if key.startswith(f"{group}.") or not group]
@@ -264,8 +267,14 @@ def probable_keys(name: str, group: str) -> list[str]:
             for key in table()
             if key.startswith(group) and words and words <= {*re.split("[_.]", key.lower())}
         ]
-        or [key for key in own if {*split_unit(_leaf(key))[0].lower().split("_")} <= words]
+        or [key for key in own if group and ends_in(name, _leaf(key))]
     )
+
+
+def ends_in(name: str, key: str) -> bool:
+    """Return whether a name is a key with words before it, in the key's unit or without one."""
+    (stem, unit), (short, ours) = split_unit(name), split_unit(key)
+    return stem.endswith(f"_{short}") and unit in ("", ours)
 
 
 def _leaf(key: str) -> str:

@@ -300,7 +300,7 @@ class Wear:
     hours: float = value(50000.0, "(0, 1e9]", "operating hours after which the study ends")
     step_mm: float = value(
         0.02, "(0, 1e4]", "growth of a clearance after which the motion is computed again",
-        "program: tests/results/wear.md",
+        "program",
     )  # fmt: skip
     bore_length_mm: float = value(
         20.0, "(0, 1e4]", "length of the bores", "assumed: as long as wide"

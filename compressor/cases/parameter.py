@@ -62,7 +62,7 @@ OTHER_UNITS = {
     "kPa": ("MPa", IN_MPA["kpa"]), "Pa": ("MPa", 1e-6), "um": ("mm", 1e-3), "cm": ("mm", 10.0),
     "m": ("mm", 1e3), "in": ("mm", 25.4), "inch": ("mm", 25.4), "mil": ("mm", 0.0254),
     "mils": ("mm", 0.0254), "kN": ("N", 1e3), "g": ("m/s2", 9.80665), "lb": ("kg", 0.45359237),
-    "Hz": ("rpm", 60.0), "cP": ("mPa s", 1.0),
+    "lbs": ("kg", 0.45359237), "Hz": ("rpm", 60.0), "cP": ("mPa s", 1.0),
 }  # fmt: skip
 
 Group = TypeVar("Group")
@@ -210,7 +210,7 @@ def convert_other(value: Any, unit: str) -> str:
     elif ours == "MPa" and unit not in ("bara", "psia"):
         note = f"; if a gauge shows it, add the atmosphere's {ATMOSPHERE_MPA:g}"
     each = f"..., 1 {unit} being {factor:g} {ours}"
-    absolute = f"{value * factor + is_gauge * ATMOSPHERE_MPA:.4g}" if is_number(value) else each
+    absolute = f"{value * factor + is_gauge * ATMOSPHERE_MPA:.6g}" if is_number(value) else each
     return absolute + note
 
 

@@ -125,7 +125,7 @@ def bars_by(
     for name, value in metrics.items():
         metric, size = NUMBERS[name], np.abs(value)
         path = apart.get(name, 0.0)
-        if metric.is_pure_number and "sensor_rms" in apart:
+        if metric.is_pure_number and metric.when != "body":
             path = size * apart["sensor_rms"] / (metrics["sensor_rms"] or math.inf)
         both = np.hypot(metric.bar.own * (value - other[name]), metric.bar.path * path)
         found[name] = np.maximum(share * both, metric.bar.least * size)

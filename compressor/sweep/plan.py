@@ -98,7 +98,8 @@ def add_times(
 ) -> Forecast:
     """Return a forecast with the time and bytes of missing jobs, run by so many processes.
 
-    Each is taken to cost as much as the middle one of its study. remark: called about compiling.
+    With the time until these have started. Each job is taken to cost as much as the middle one of
+    its study. remark: called about compiling.
     """
     if not missing:
         return counts
