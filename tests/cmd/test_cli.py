@@ -213,7 +213,7 @@ def test_tradeoff_stores_draws_and_lists(case_file, compsim):
 
 
 def test_explain_models_prints_what_moves_metrics(case_file, compsim, monkeypatch):
-    """Without laws and mechanisms, which take a minute to compile: test_variants has them."""
+    """Without laws and mechanisms, which take a minute to compile: test_tradeoff has them."""
     monkeypatch.setattr("compressor.studies.tradeoff.variants.other_models", lambda *of: [])
     case_file("worn.yaml", joint="big_end", clearance_mm=[0.2, 0.3], solve={"duration_rev": 0.1})
     out = compsim("explain", "--models", "worn.yaml", "-r", "kept").out
