@@ -34,7 +34,7 @@ LAWS = ("contact_laws", "friction_laws")
 TESTED_IN = {
     "mechanism": ("general_mechanism", "steppers"),
     "mechanism_rows": ("general_mechanism", "feature_runs"),
-    "march": ("march", "wear_stages"),
+    "march": ("march", "wear"),
     "motion": ("motion", *LAWS),
     "contact": ("contact", *LAWS),
     "loads": ("loads", "card"),
