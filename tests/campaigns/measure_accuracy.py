@@ -71,7 +71,7 @@ def paper_case(joint, clearance):
     for word in ACCURACY:
         found = simulate(Case.from_values({**values, "solve": {"accuracy": word}}))
         if truth is None:
-            whole = reference.reference_solution(params, joint, found["time"].values)["a"]
+            whole = reference.reference_solution(params, joint, found["time"].values)
             truth = whole[found["time"].values >= found.attrs["settle"]]
         rows[word] = {
             "error": apart(settled(found), truth),

@@ -161,7 +161,7 @@ def main(target):
     errors, contestants, rows, checks = {}, [], [], []
     for scene in SCENES:
         print(f"{scene}: reference, errors", file=sys.stderr)
-        truth = reference.reference_solution(params(scene), scene, output_grid(DURATION))["a"]
+        truth = reference.reference_solution(params(scene), scene, output_grid(DURATION))
         errors[scene] = {
             rtol: error(ours(scene, rtol)["acceleration"].values, truth) for rtol in LADDER
         }

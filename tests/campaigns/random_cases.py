@@ -1,19 +1,16 @@
 """Cases drawn at random: the ground on which promises and error bars are judged.
 
 Clearance 0.01-1 mm, rod 2-8 kg, reciprocating mass 4-25 kg, 100-1500 rpm, all loads and all scenes
-with clearance; friction is on, all else as by default. `random_cases` is a Sobol sequence, with
-speeds drawn evenly; `strangers` draws clearance and speed evenly in their logarithms.
+with clearance; friction is on, all else as by default. Clearance and speed are even in logarithms.
 """
 
 from functools import cache
 
 import numpy as np
-from scipy.stats import qmc
 
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 
-SEED = 2021
 LOADS = ("spring", "gas", "none")
 JOINTS = ("big_end", "small_end", "both")
 
@@ -35,15 +32,6 @@ def drawn(load, joint, clearance, rod, mass, rpm):
             "speed_rpm": rounded(rpm),
         },
     }
-
-
-def random_cases(count=200):
-    """The first cases of the sequence."""
-    points = qmc.Sobol(6, seed=SEED).random(256)[:count]
-    return [
-        drawn(load, joint, clearance, rod, mass, 100 + 1400 * speed)
-        for clearance, rod, mass, speed, load, joint in points
-    ]
 
 
 def strangers(seed, count):

@@ -126,12 +126,6 @@ def flipped(rows, columns, head):
     return markdown([head, *rows], lines)
 
 
-def listed(found):
-    """Return a table of numbers by name."""
-    rows = [[name.replace("_", " "), number(value)] for name, value in found.items()]
-    return markdown(["quantity", "value"], rows)
-
-
 def number(value, digits=3):
     """Return a number with some digits as a text, a count whole, a text as it is."""
     if isinstance(value, str):
@@ -239,7 +233,9 @@ def sweep(found):
     peaks = {f"peak memory of a {name}, MB": size for name, size in found["peak_MB"].items()}
     lost = sum(max(0, one["told"] - one["stored"]) for one in found["kills"])
     kills = {"times killed": len(found["kills"]), "jobs reported as done and lost": lost}
-    return listed(start | numbers | peaks | kills)
+    every = start | numbers | peaks | kills
+    rows = [[name.replace("_", " "), number(value)] for name, value in every.items()]
+    return markdown(["quantity", "value"], rows)
 
 
 def share(row):

@@ -46,7 +46,7 @@ def test_paper_cases_against_the_reference_and_a_second_method(joint, clearance)
         word: run(joint, clearance, accuracy=word, **span) for word in ("draft", "standard", "fine")
     }
     times = words["fine"]["time"].values
-    truth = reference.reference_solution(params, joint, times, rtol=1e-9, method="LSODA")["a"]
+    truth = reference.reference_solution(params, joint, times, rtol=1e-9, method="LSODA")
     for word, found in words.items():
         assert apart(found["acceleration"].values, truth) <= ACCURACY[word].promise, word
         assert float(found["energy_residual"]) <= residual_bound(found, revolutions=1), word
