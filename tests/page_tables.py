@@ -266,9 +266,8 @@ def deciding_table():
 
 def reason_table():
     """The reasons of failures, what they mean and what to do."""
-    lines = ["| reason | what it means | what to do |", "|---|---|---|"]
-    lines += [f"| `{one}` | {one.meaning} | {one.remedy} |" for one in Reason]
-    return "\n".join(lines) + "\n"
+    rows = [[f"`{one}`", one.meaning, one.remedy] for one in Reason]
+    return markdown(["reason", "what it means", "what to do"], rows)
 
 
 def block(name):

@@ -4,10 +4,9 @@ Writes a small JSON file. All run on one core, in rounds: each tool, then ours a
 tolerance whose error is no greater than that tool's. Nothing here has threads or waits, so that
 CPU time is the wall time of a core without other work, and says more on a busy machine. A call
 starts from the problem's numbers and ends with the crosshead's acceleration on the output grid of
-0.1 ms; ours is the whole
-`simulate(case)`, with all its series, metrics and energy balance, the kernel's own seconds beside
-it. Errors are against the reference of reference.py. What is not installed, or fails, is a
-row with its reason.
+0.1 ms; ours is the whole `simulate(case)`, with all its series, metrics and energy balance, the
+kernel's own seconds beside it. Errors are against the reference of reference.py. What is not
+installed, or fails, is a row with its reason.
 """
 
 import os
@@ -16,7 +15,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from importlib import metadata
 from statistics import median
 from typing import NamedTuple
 
@@ -32,7 +30,6 @@ LADDER = (1e-3, 5e-4, 3e-4, 2e-4, 1e-4, 7e-5, 5e-5, 3e-5, 2e-5, 1.4e-5, 1e-5, 7e
           1e-6)  # fmt: skip
 ROUNDS = 5
 LEAST_CPU = 0.2  # s of a contest's round: one call of some milliseconds says little
-LIBRARIES = ("exudyn", "numbalsoda")
 TIGHT = 1e-9  # tolerance of Exudyn's run that verifies ours
 
 
@@ -145,17 +142,6 @@ def contests(scene, truth, our_errors):
     return taking_part, rows
 
 
-def versions():
-    """Versions of the peers that are installed."""
-    found = {}
-    for name in LIBRARIES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "not installed"
-    return found
-
-
 def main(target):
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     errors, contestants, rows, checks = {}, [], [], []
@@ -177,8 +163,7 @@ def main(target):
         rows.append({**about, "scene": contest.scene, **contest.row(errors[contest.scene])})
     order = [peer.tool for peer in PEERS]
     rows.sort(key=lambda row: (order.index(row["tool"]), SCENES.index(row["scene"])))
-    kept = provenance("make peers")
-    kept["versions"] |= versions()
+    kept = provenance("make peers", "exudyn", "numbalsoda")
     kept |= {"rounds": ROUNDS, "agreement": checks, "rows": rows}
     keep(target, kept, 3)
 

@@ -65,13 +65,6 @@ def changes(scene, case):
     }  # fmt: skip
 
 
-def figure(kept):
-    """The figure of a kept measurement."""
-    rows = [{name: np.nan if it is None else it for name, it in row.items()}
-            for row in kept["points"]]  # fmt: skip
-    return render(draw_work_precision(tabulate(rows)), "svg")
-
-
 def main(target):
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "faults.yaml")
@@ -88,7 +81,8 @@ def main(target):
     found = rounds[0].assign(seconds=xr.concat([one["seconds"] for one in rounds], "n").min("n"))
     kept = {**provenance("make tradeoff"), "points": [*points(found)], "changes": moved}
     keep(target, kept, 3)
-    Path(target).with_suffix(".svg").write_bytes(figure(kept))
+    drawn = draw_work_precision(tabulate(kept["points"]))
+    Path(target).with_suffix(".svg").write_bytes(render(drawn, "svg"))
 
 
 if __name__ == "__main__":

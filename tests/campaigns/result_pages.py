@@ -41,16 +41,20 @@ def read_commit():
     return f"{head} with changes" if changed else head
 
 
-def provenance(command):
-    """Return command, date, commit, machine and versions of a measurement, which its file keeps."""
-    names = ("compsim", "numpy", "scipy", "numba")
+def provenance(command, *more):
+    """Return command, date, commit, machine and versions of a measurement, which its file keeps.
+
+    more: libraries beside those of the program.
+    """
+    names = ("compsim", "numpy", "scipy", "numba", *more)
+    installed = {one.name: one.version for one in metadata.distributions()}
     commit = read_commit()
     return {
         "command": command,
         "date": date.today().isoformat(),
         **({"commit": commit} if commit else {}),
         "machine": f"{platform.machine()}, Python {platform.python_version()}",
-        "versions": {name: metadata.version(name) for name in names},
+        "versions": {name: installed.get(name, "not installed") for name in names},
     }
 
 

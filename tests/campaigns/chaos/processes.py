@@ -43,9 +43,9 @@ class Run:
         """Take in what the terminal shows, for so long, or until the run ends; whether it runs."""
         until = time.monotonic() + seconds
         self.read()
-        while self.runs() and time.monotonic() < until:
+        while self.child.is_alive() and time.monotonic() < until:
             self.read(min(0.005, max(0.0, until - time.monotonic())))
-        return self.runs()
+        return self.child.is_alive()
 
     def read(self, patience=0.0):
         """What the terminal shows; nothing where nobody has it open any more."""
@@ -56,10 +56,6 @@ class Run:
                 time.sleep(patience)
                 return
             patience = 0.0
-
-    def runs(self):
-        """Whether it has not ended."""
-        return self.child.is_alive()
 
     def send(self, number, whole=False):
         """Send a signal to itself alone, or to the whole session at once."""
