@@ -20,7 +20,7 @@ from result_pages import keep, provenance, run_campaign
 SEED = 1
 FAST = Path("/dev/shm")  # in memory, where there is one: what is tried is not the disk
 CAMPAIGNS = {  # module of chaos/: trials
-    "kill": 300, "power": 100, "faults": 136, "flips": 3000, "concurrent": 100,
+    "kill": 300, "power": 100, "faults": 136, "poison": 200, "flips": 3000, "concurrent": 100,
 }  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """Runs of `compsim` in sessions of their own: watched on a terminal, killed, searched for orphans.
 
 A run is the real command, `python -m compsim`, or a fork of this process that calls its `main`:
-that starts in milliseconds, and can be prepared, as for slow disks.
+that starts in milliseconds, and can be prepared (slow disks, jobs poisoned).
 """
 
 import contextlib
