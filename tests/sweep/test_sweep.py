@@ -195,7 +195,7 @@ def test_a_run_on_windows_ends_with_one_clear_line(studies, tmp_path, monkeypatc
     for words in (["run"], ["follow", "--over", "machine.speed_rpm=300:500:2"]):
         err = compsim(*words, made[0].path, "-r", tmp_path / "out", code=2).err
         (line,) = [line for line in err.splitlines() if "has no resource, which a run" in line]
-        assert line.endswith("needs: run it under Linux, macOS or WSL")
+        assert "needs: run it under Linux, macOS or WSL, and open the folder" in line
         assert "Traceback" not in err
 
 
