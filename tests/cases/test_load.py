@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from compressor.cases.case import Case
@@ -205,13 +205,18 @@ def problems(path: str, *overrides: str) -> list[FileProblem]:
     return []
 
 
+# as YAML has them: also U+0085, U+2028 and U+2029
+LINE_ENDS = (b"\n", b"\r", b"\xc2\x85", b"\xe2\x80\xa8", b"\xe2\x80\xa9")
+
+
 @one_file
+@example("\x85\x850")
 @given(st.text() | st.binary() | YAMLISH.map("".join) | YAMLISH.map(" ".join) | SWEPT)
 def test_any_file_is_read_or_refused(write, text):
     content = text.encode(errors="replace") if isinstance(text, str) else text
     for problem in problems(write(content)):
         assert str(problem).isprintable()
-        assert problem.place.line <= content.count(b"\n") + content.count(b"\r") + 2
+        assert problem.place.line <= sum(content.count(end) for end in LINE_ENDS) + 2
 
 
 @one_file
