@@ -138,8 +138,10 @@ PART_WORDS = {
 
 
 # names of pins -> the joint that each is in
-PINS = (("crank_pin", "big_end"), ("crosshead_pin", "small_end"), ("wrist_pin", "small_end"),
-        ("gudgeon_pin", "small_end"))  # fmt: skip
+PINS = {
+    "crank_pin": "big_end", "crosshead_pin": "small_end", "wrist_pin": "small_end",
+    "gudgeon_pin": "small_end",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -326,7 +328,7 @@ class Parameter:
         """Return the error of a value of another kind; words: of these one may be misspelt."""
         message = f"needs {self.needed}, not {quote_value(value)}"
         word = words[0][:MAX_WORD_LENGTH] if words and isinstance(words[0], str) else ""
-        aliases = dict(self.aliases) | {name: one for name, one in PINS if one in self.choices}
+        aliases = dict(self.aliases) | {n: one for n, one in PINS.items() if one in self.choices}
         if hint := did_you_mean(word, [*aliases, *self.words], aliases):
             return f"{message}; {hint}"
         number = AS_NUMBER.fullmatch(word) if self.is_number else None
