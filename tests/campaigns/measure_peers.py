@@ -6,7 +6,8 @@ CPU time is the wall time of a core without other work, and says more on a busy 
 starts from the problem's numbers and ends with the crosshead's acceleration on the output grid of
 0.1 ms; ours is the whole `simulate(case)`, with all its series, metrics and energy balance, the
 kernel's own seconds beside it. Errors are against the reference of reference.py. What is not
-installed, or fails, is a row with its reason.
+installed, or fails, is a row with its reason. At last one evaluation of the equations is timed
+(peers/evaluation.py).
 """
 
 import os
@@ -19,7 +20,7 @@ from statistics import median
 from typing import NamedTuple
 
 import reference
-from peers import multibody, notebook, soda
+from peers import evaluation, multibody, notebook, soda
 from peers.mechanism import DURATION, SCENES, case_values, error, loosest, output_grid, params
 from result_pages import keep, provenance, run_campaign
 
@@ -164,7 +165,8 @@ def main(target):
     order = [peer.tool for peer in PEERS]
     rows.sort(key=lambda row: (order.index(row["tool"]), SCENES.index(row["scene"])))
     kept = provenance("make peers", "exudyn", "numbalsoda")
-    kept |= {"rounds": ROUNDS, "agreement": checks, "rows": rows}
+    timed_alone = {"scenes": [evaluation.beside_transcription(scene) for scene in SCENES]}
+    kept |= {"rounds": ROUNDS, "agreement": checks, "rows": rows, "evaluations": timed_alone}
     keep(target, kept, 3)
 
 

@@ -193,7 +193,13 @@ def peers(found):
             ("its wall time / our solver's", "kernel_wall_ratio", 2),
         )
     }  # fmt: skip
-    return table(tools.values(), columns)
+    timed = found["evaluations"]["scenes"]
+    return table(tools.values(), columns) + "\n" + table(
+        timed,
+        {"one evaluation": lambda row: row["scene"].replace("_", " "),
+         "ours, ns": lambda row: number(1e9 * row["seconds"]),
+         "the other, ns": lambda row: number(1e9 * row["other_seconds"]), "ratio": "ratio"},
+    )  # fmt: skip
 
 
 def tradeoff(found):

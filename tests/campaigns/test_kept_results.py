@@ -76,6 +76,8 @@ def test_contests_with_other_tools_are_at_equal_or_better_error():
     for check in found["agreement"]:  # wrong lever arms would leave 1e-3 and more
         assert check["ours_to_reference"] < 1e-6
         assert "reason" in check or check["exudyn_to_ours"] < 1e-4
+    for one in found["evaluations"]["scenes"]:  # the same numbers are what is timed
+        assert one["apart"] < 1e-9
 
 
 # ---- studies
