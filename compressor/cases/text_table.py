@@ -12,9 +12,8 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
 
 from compressor.program import CompsimError, printable
 
@@ -117,36 +116,36 @@ def open_text_table(path: str | Path) -> TextTable:
     """Return the table of a text file. Raises TextTableError, or OSError."""
     text = decode_text(path, Path(path).read_bytes())
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    blocks: list[_Block] = []
+    found: list[tuple[Merit, TextTable]] = []
     for mark in SEPARATORS:
         with contextlib.suppress(csv.Error):
             rows = [*_split(lines[:SAMPLED_LINES], mark)]
-            blocks += filter(None, (_find_block(rows, mark, sign) for sign in DECIMALS))
-    if not blocks:
+            found += filter(None, (_find_table(str(path), rows, mark, sign) for sign in DECIMALS))
+    if not found:
         first = next((line for line in lines if line.strip()), "")
         tried = ", ".join(SEPARATORS.values())
         raise TextTableError(
             f"{path}: holds no rows of numbers (its first line: {printable(first[:60])!r}; "
             f"separators tried: {tried}; decimal point and comma)"
         )
-    block = max(blocks, key=lambda one: one.merit)
-    if block.separator == "," and block.decimal == "." and 2 * len(block.header) == block.width:
+    _, table = max(found, key=lambda one: one[0])
+    first_line, width, header = table.rows[0][0], len(table.numeric), table.names
+    if table.separator == "," and table.decimal == "." and 2 * len(header) == width:
         raise TextTableError(
-            f"{path}:{block.first_line}: {block.width} cells below a header of "
-            f"{len(block.header)}: commas separate cells and decimals; "
-            "write the file with another separator"
+            f"{path}:{first_line}: {width} cells below a header of {len(header)}: commas separate "
+            "cells and decimals; write the file with another separator"
         )
     try:
-        rows = [row for row in _split(lines, block.separator) if row[0] >= block.first_line]
+        rows = [row for row in _split(lines, table.separator) if row[0] >= first_line]
     except csv.Error as error:
         raise TextTableError(f"{path}: is no table: {error}") from error
-    names, header_line = tuple(str(k + 1) for k in range(block.width)), 0
-    if len(block.header) >= block.width:
-        names, header_line = tuple(block.header), block.header_line
-        while len(names) > block.width and not names[-1]:
-            names = names[:-1]
-    numeric = (*block.numeric, *[False] * (len(names) - block.width))
-    return TextTable(str(path), block.separator, block.decimal, names, header_line, numeric, rows)
+    if len(header) < width:
+        names = tuple(str(k + 1) for k in range(width))
+        return replace(table, rows=rows, names=names, header_line=0)
+    while len(header) > width and not header[-1]:
+        header = header[:-1]
+    numeric = (*table.numeric, *[False] * (len(header) - width))
+    return replace(table, rows=rows, names=header, numeric=numeric)
 
 
 def decode_text(path: str | Path, data: bytes) -> str:
@@ -172,24 +171,13 @@ def _split(lines: Sequence[str], separator: str) -> Iterator[Row]:
         yield from ((reader.line_num, cells) for cells in reader)
 
 
-class _Block(NamedTuple):
-    """Where the rows of numbers begin by one separator and decimal sign.
-
-    merit: the greater, the more likely; width: columns up to the last that holds numbers.
-    """
-
-    separator: str
-    decimal: str
-    merit: tuple[bool, int]
-    header: list[str]
-    header_line: int
-    first_line: int
-    width: int
-    numeric: tuple[bool, ...]
+Merit = tuple[bool, int]  # of a way to read a table: the greater, the more likely
 
 
-def _find_block(rows: Sequence[Row], separator: str, decimal: str) -> _Block | None:
-    """Return where the rows of numbers begin; None where there are none.
+def _find_table(
+    path: str, rows: Sequence[Row], separator: str, decimal: str
+) -> tuple[Merit, TextTable] | None:
+    """Return the table in rows, up to the last column of numbers; None where there is none.
 
     Rows have a shape: which of their cells are numbers. The shape that holds most numbers is the
     table's. Rows above its first one that have a number in one of its columns belong to it, and are
@@ -210,13 +198,13 @@ def _find_block(rows: Sequence[Row], separator: str, decimal: str) -> _Block | N
     width = max((k + 1 for k, is_number in enumerate(numeric) if is_number), default=0)
     if not width or (separator == " " and not all(numeric[:width])):
         return None  # words that are apart by blanks are text
-    header = _names(rows[:first]) if first else []
+    header = tuple(_names(rows[:first])) if first else ()
     header_line = rows[first - 1][0] if first else 0
     merit = sum(map(bool, header)) == width and WORDS not in shape, merits[shape]
-    return _Block(
-        separator, decimal, merit, header, header_line, rows[first][0], width,
-        tuple(numeric[:width]),
-    )  # fmt: skip
+    columns_read = tuple(numeric[:width])
+    return merit, TextTable(
+        path, separator, decimal, header, header_line, columns_read, rows[first:]
+    )
 
 
 DIGITS, WORDS, EMPTY = "0", "w", " "  # what a cell is
