@@ -37,20 +37,15 @@ WORDS = {  # dimension -> what its places are called
 FACTS = ("promise", "regime", "method", "rtol", "program", "libraries")
 
 
-def sections(
-    found: "JobReport", limits: tuple[float, float], units: Units = "usual"
-) -> Iterator[tuple[str, list[str]]]:
-    """Yield the headings and lines of a job.
-
-    limits: of the rod load's reversal, degrees and percent; units: of the numbers.
-    """
+def sections(found: "JobReport", units: Units = "usual") -> Iterator[tuple[str, list[str]]]:
+    """Yield the headings and lines of a job; units: of the numbers."""
     attributes = found.attributes
     if "stop_time" in attributes:
         angle = math.degrees(attributes["stop_crank_angle"]) % 360
         where = f"at {attributes['stop_time']:.9g} s, {angle:.5g} degrees of crank angle"
         yield "", align([("stopped", where)])
     known = [*numbers(found, units, "tally", "statistics", "body")]
-    lines = align([*known, *reversal_verdict(found, *limits)])
+    lines = align([*known, *reversal_verdict(found)])
     yield "metrics, with their error bars", [*lines, *notes(found), *found.caveats]
     yield "relative errors of the time series", align(series_errors(found))
     yield "the run", align([*numbers(found, units, "run"), *facts(found)])
@@ -144,10 +139,10 @@ def places(found: "JobReport", row: metrics.Metric) -> Iterator[tuple[tuple[int,
         yield tuple(number for number, _ in choice), ", ".join(parts)
 
 
-def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list[Line]:
-    """Return whether the rod load changes sides for long and far enough; [] without signals."""
+def reversal_verdict(found: "JobReport") -> list[Line]:
+    """Return whether the rod load changes sides as API 618 requires; [] without signals."""
     worst, texts = math.inf, []
-    for name, unit, least in (("angle", math.degrees(1.0), degrees), ("share", 100.0, percent)):
+    for name, unit, least in (("angle", math.degrees(1.0), 15.0), ("share", 100.0, 3.0)):
         value = unit * found.numbers.get(f"rod_load_reversal_{name}", math.nan)
         bar = unit * found.numbers.get(f"rod_load_reversal_{name}_error", math.nan)
         if math.isnan(value):
@@ -159,9 +154,8 @@ def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list
         clear = value - least
         worst = min(worst, math.copysign(1.0, clear) if clear and abs(clear) >= bar else 0.0)
     word = {1.0: "passes", 0.0: "cannot be distinguished from", -1.0: "fails"}[worst]
-    kind = "API 618's" if (degrees, percent) == (15.0, 3.0) else "the maker's"
-    verdict = f"reversal of {texts[0]} degrees and {texts[1]} %: {word} {kind} "
-    return [("rod load", f"{verdict}{degrees:g} degrees and {percent:g} %")]
+    verdict = f"reversal of {texts[0]} degrees and {texts[1]} %: {word} API 618's"
+    return [("rod load", f"{verdict} 15 degrees and 3 %")]
 
 
 def notes(found: "JobReport") -> Iterator[str]:

@@ -1,7 +1,6 @@
 """`compsim show`: what is known of one job."""
 
 import dataclasses
-import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -15,31 +14,13 @@ if TYPE_CHECKING:
     from compressor.store import JobReport
 
 
-def read_reversal(_: click.Context, __: click.Parameter, text: str) -> tuple[float, float]:
-    """Return least angle (degrees) and share (percent) of a reversal, from the option's text."""
-    try:
-        degrees, percent = (float(part) for part in text.split(","))
-    except ValueError:
-        degrees = percent = math.nan
-    if not (0.0 <= degrees <= 180.0 and 0.0 <= percent <= 100.0):
-        raise click.BadParameter(f"{text!r}: give degrees and percent, such as 30,25")
-    return degrees, percent
-
-
 @click.command()
 @options.job
 @options.results
 @click.option("--case", is_flag=True, help="Print the case alone, as a case file with all keys.")
-@click.option(
-    "--reversal",
-    default="15,3",
-    metavar="DEG,PERCENT",
-    callback=read_reversal,
-    help="Ask for this reversal of the rod load: degrees, and percent on its smaller side.",
-)
 @options.units("kN, mm, µm, m/s²")
 @options.as_json
-def show(words, folder, case, reversal, units, as_json) -> int:
+def show(words, folder, case, units, as_json) -> int:
     """Print all that is known of one job.
 
     A job is named by the beginning of its key, or by its study and values of the study's axes:
@@ -51,7 +32,7 @@ def show(words, folder, case, reversal, units, as_json) -> int:
     It prints which studies the job belongs to and where in them, how it ended and why, its numbers
     with their error bars, how it was run, and the values of its case other than the defaults.
     Of a job with signals, it says whether the rod load at the crosshead pin changes its side as API
-    618 requires, by 15 degrees and 3 percent, or as a maker does. --json has all numbers in SI.
+    618 requires, by 15 degrees and 3 percent. --json has all numbers in SI.
     """
     options.check_json_units(as_json, units)
     if case and as_json:
@@ -77,7 +58,7 @@ def show(words, folder, case, reversal, units, as_json) -> int:
         return screen.DONE
     if found.status == "failed":
         screen.print_text(f"  what to do: {remedy(found.reason)}")
-    for heading, lines in sections(found, reversal, units or "usual"):
+    for heading, lines in sections(found, units or "usual"):
         if lines and heading:
             screen.print_text(heading)
         screen.print_lines(f"  {line}" for line in lines)

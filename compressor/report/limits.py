@@ -97,7 +97,7 @@ def read_limits(texts: Iterable[str], units: Units = "usual") -> Limits:
                              f"'sensor_peak=20,50 m/s²'; {near}")  # fmt: skip
         if parts[1] in MORE_IS_BETTER:
             raise LimitError(f"{text!r}: more reversal is better, and zone A is below a limit; "
-                             "compsim show JOB --reversal 30,25 judges it")  # fmt: skip
+                             "compsim show JOB judges it")  # fmt: skip
         if parts[1] in found:
             raise LimitError(f"{text!r}: {parts[1]} has limits already")
         found[parts[1]] = read_values(parts[2], shown_measure(parts[1], units), text)

@@ -79,8 +79,6 @@ MISTAKES = [
     ("show wear clearance_mm=0.1 clearance_mm=0.2", "an axis is given twice"),
     ("show wear --case --json", "--case prints a case file: leave out --json"),
     ("show wear --json --units plant", "--json has all numbers in SI", "leave out --units plant"),
-    *((f"show ab --reversal {text}", "give degrees and percent, such as 30,25")
-      for text in ("15", "a,b", "200,3", "15,-1")),
     ("show", "Missing argument 'JOB | STUDY [AXIS=VALUE]...'"),
     ("export gird -o x.csv", "holds no study 'gird'; it holds big-end, wear"),
     ("export wear -o k.xlsx", "k.xlsx: is no name of a CSV file; end it in .csv"),
