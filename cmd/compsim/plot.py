@@ -6,7 +6,7 @@ from compressor.program import did_you_mean
 from compsim import options, screen
 
 OF_JOB = ["analyst", "signals", "cards", "spectra", "orbits", "impacts"]
-OF_STUDY = ["cycles", "segments", "waterfall"]
+OF_STUDY = ["cycles", "waterfall"]
 LISTED = f"of a job {', '.join(OF_JOB)}; of a study {', '.join(OF_STUDY)}"
 
 
@@ -45,14 +45,6 @@ def read_figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str,
     metavar="KEY=VALUE",
     help="Draw the jobs with this value of another axis; by default its first.",
 )
-@click.option(
-    "--limit",
-    default="",
-    show_default=False,
-    metavar="LIMIT",
-    help="Mark segments whose rms is above this: a number and its unit, such as 2g, or as 3x, "
-    "times the machine without clearance.",
-)
 @options.units("kN, mm, µm, m/s²")
 def plot(words, folder, output, units, **chosen) -> int:
     """Draw one job, or one study.
@@ -64,7 +56,7 @@ def plot(words, folder, output, units, **chosen) -> int:
     compsim plot 3fa9c2
     compsim plot bearing-wear clearance_mm=0.2 machine.rod_mass_kg=3
     compsim plot bearing-wear --over clearance_mm --at machine.rod_mass_kg=3
-    compsim plot machines --what segments --limit 3x
+    compsim plot machines --what cycles
 
     Of a job: a revolution as an analyst reads it (the sensor's record, or the crosshead's
     acceleration, above the rod load, with reversals, valve events and impacts), its signals over

@@ -21,7 +21,7 @@ from compressor.report.figures.sweep_data import name_in_words, shown_value
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.study_section import file_name
 from compressor.store import Stored, StoredStudy
-from compressor.units import Units, read_quantity, split_number
+from compressor.units import Units
 
 
 class PlotError(CompsimError):
@@ -34,15 +34,13 @@ class PlotError(CompsimError):
 class PlotChoice:
     """What to draw: names of figures, all by default; of a study the axis and the other values.
 
-    over: the axis by its key or the end of it; at: `key=value` of other axes, else their first;
-    limit: of a segment's rms with its unit, or with an x times the healthy machine's. units: of
-    the figures, as `compressor.units` has them.
+    over: the axis by its key or the end of it; at: `key=value` of other axes, else their first.
+    units: of the figures, as `compressor.units` has them.
     """
 
     what: tuple[str, ...] = ()
     over: str = ""
     at: tuple[str, ...] = ()
-    limit: str = ""
     units: Units = "usual"
 
 
@@ -105,8 +103,8 @@ def job_figures(
 ) -> Iterator[DrawnFigure]:
     """Yield the figures of a job that has time series."""
     figures = choose_figures(choice.what, [*JOB], f"job {key}")
-    if choice.over or choice.at or choice.limit:
-        raise PlotError(f"{key} is one job: --over, --at and --limit are for studies")
+    if choice.over or choice.at:
+        raise PlotError(f"{key} is one job: --over and --at are for studies")
     run = drawable(stored, studies, key)
     try:
         worn = bool(analysis.joints_with_clearance(run))
@@ -159,17 +157,7 @@ def draw_study(stored: Stored, study: StoredStudy, choice: PlotChoice) -> Iterat
     rows = [swept_row(stored, value, key) for value, key in jobs]
     if not any(row.shaking for row in rows):
         raise PlotError(nothing_to_draw(stored, study, rows))
-    limit = read_limit(choice.limit)
-    if limit and "segments" not in figures:
-        raise PlotError(f"--limit {choice.limit} is of segments: add --what segments")
-    if "segments" in figures:
-        rows = with_segments(stored, jobs, rows, limit)
     for name in figures:
-        if name == "segments" and not any(row.segments for row in rows):
-            if choice.what:
-                raise PlotError(f"no job of {study.name} has a sensor's record in segments: run it "
-                                "with body: true and sensor: true")  # fmt: skip
-            continue
         kept = keep_sensed(rows) if name == "cycles" else rows
         shown = STUDY[name].make(kept, axis_words(over), units=choice.units)
         shown.figure.layout.title = study_title(study, shown.title, where)
@@ -211,53 +199,6 @@ def axis_words(key: str) -> str:
     unit = (row.unit if row else "") or ""
     name = name_in_words(store.coordinate_names([key])[key], unit)
     return f"{name} ({unit})" if unit else name
-
-
-def read_limit(text: str) -> tuple[float, bool] | None:
-    """Return a segment's limit, m/s2 or times the healthy machine's, and whether it is that.
-
-    None for "". Raises PlotError.
-    """
-    if not text:
-        return None
-    number, unit = split_number(text)
-    try:
-        value = number if unit == "x" else read_quantity(text, "m/s2") if unit else None
-    except ValueError:
-        value = None
-    if value is None or value <= 0.0:
-        raise PlotError(f"--limit {text}: give a number and its unit, such as '20 m/s²' or 2g, or "
-                        "times the machine without clearance, such as 3x")  # fmt: skip
-    return value, unit == "x"
-
-
-def with_segments(
-    stored: Stored,
-    jobs: Sequence[tuple[Any, str]],
-    rows: Sequence[SweptRow],
-    limit: tuple[float, bool] | None,
-) -> list[SweptRow]:
-    """Return rows of jobs with the segments of those that have a sensor; raises PlotError.
-
-    limit: see `PlotChoice`. Machines that differ in clearance alone have one healthy machine.
-    """
-    healthy: dict[str, np.ndarray] = {}
-    found = []
-    for (_, key), row in zip(jobs, rows, strict=True):
-        run = None if row.problem else stored.job(key)
-        if run is None or "sensor_segment_rms" not in run:
-            found.append(row)
-            continue
-        case = analysis.case_of(run)
-        one = cases.with_ideal_joints(case).key
-        if one not in healthy:
-            twin = analysis.healthy_twin(run)
-            if twin is None:
-                raise PlotError("the same machine without clearance, whose levels limits are times "
-                                "of, does not run to its end")  # fmt: skip
-            healthy[one] = twin["sensor_segment_rms"].values
-        found.append(row.with_segments(run, healthy[one], limit))
-    return found
 
 
 MAX_PAGE_ROWS = 12  # of a study's jobs whose series a page reads

@@ -11,11 +11,9 @@ from compsim import cli
 from conftest import damage_series, store_cases
 
 from compressor.analysis.shaking import frame_forces
-from compressor.cases.case import Case
 from compressor.report.figures import FIGURES
 from compressor.report.figures.table import spell
 from compressor.report.plots import job_title
-from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
 
@@ -161,7 +159,6 @@ def test_a_damaged_job_is_a_row_without_series(folder, tmp_path, compsim, unpain
         ("worn clearance_mm=0.3", "2 jobs of worn have clearance_mm=0.3; choose one"),
         ("worn --what orbits", "worn is a study: for orbits name a job, such as"),
         ("worn --what noise", "there is no figure 'noise'; there are analyst"),
-        ("worn --what segments", "no job of worn has a sensor's record in segments: run it with b"),
         ("worn --at speed_rpm=450", "no job of worn has machine.speed_rpm=450; there are 400"),
         ("worn --at clearance_mm=0.1", "needs key=value of an axis other than"),
         ("bare", "no job of bare can be drawn: no series: run it again with --set output.keep"),
@@ -169,7 +166,7 @@ def test_a_damaged_job_is_a_row_without_series(folder, tmp_path, compsim, unpain
         ("KEY-halted", "failed: budget_steps"),
         ("KEY-bare", "kept no time series: run it again"),
         ("KEY-short", "no whole settled revolution"),
-        ("KEY-worn --over clearance_mm", "--over, --at and --limit are for studies"),
+        ("KEY-worn --over clearance_mm", "--over and --at are for studies"),
         ("KEY-worn --what cycles", "has no figure 'cycles'"),
         ("KEY-worn --what cards", "has no gas in its cylinder: cards are of load: gas"),
         ("KEY-ideal --what orbits", "ideal joints"),
@@ -180,27 +177,3 @@ def test_what_cannot_be_drawn_is_told(plot, folder, words, told):
     code, found, err = plot(*named.split())
     assert (code, found) == (2, {})
     assert told in " ".join(err.split())
-
-
-def test_segments_of_a_study_are_drawn_beside_the_healthy_machine(tmp_path, compsim, unpainted):
-    """The limit is times the rms of the same machine without clearance; other studies have none."""
-    values = {
-        "joint": "big_end", "clearance_mm": [0.05, 0.2], "sensor": True,
-        "body": {"frequency_x_Hz": 4.0, "frequency_y_Hz": 30.0}, "solve": SOLVE,
-    }  # fmt: skip
-    home = tmp_path / "results"
-    (study,) = store_cases(tmp_path, heard=values)
-    sound = simulate(Case.from_values({**values, "joint": "none", "clearance_mm": 0}))
-    words = ["plot", "heard", "--what", "segments", "-r", home, "-o", tmp_path / "out"]
-    told = compsim(*words, "--limit", "5x").out
-    healthy = sound["sensor_segment_rms"].values
-    runs = [read_store(home).job(case.key)["sensor_segment_rms"].values for case in study.cases]
-    over = [(rms > 5 * healthy).sum() for rms in runs]
-    assert re.search(rf"over their limit: {over[0]}\b.* at 0\.05, {over[1]}\b.* at 0\.2;", told)
-    place = int(np.argmax(runs[0] / healthy))
-    assert f"{10 * place} to {10 * place + 10}° at 0.05, {spell(runs[0][place])} m/s² over" in told
-    err = compsim(*words, "--limit", "5", code=2).err
-    assert "give a number and its unit, such as '20 m/s²'" in err
-    other = [word if word != "segments" else "cycles" for word in words]
-    err = compsim(*other, "--limit", "5x", code=2).err
-    assert "--limit 5x is of segments: add --what segments" in err

@@ -1,11 +1,10 @@
 """Figures of a study along an axis: a row a job, over orders or over the crank angle."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import plotly.graph_objects as go
-import xarray as xr
 
 from compressor import analysis
 from compressor.report.figures import style
@@ -16,65 +15,18 @@ from compressor.units import Units
 
 
 @dataclass(frozen=True)
-class Segments:
-    """The rms of a sensor's record in 36 segments of 10 degrees, m/s2, (36,) each.
-
-    `rms` with its error `bar`; `healthy`: of the same machine without clearance; `limit`: nan where
-    none is given.
-    """
-
-    rms: np.ndarray
-    bar: np.ndarray
-    healthy: np.ndarray
-    limit: np.ndarray
-
-    @property
-    def ratio(self) -> np.ndarray:
-        """Return the rms over that of the machine without clearance, (36,)."""
-        return self.rms / self.healthy
-
-    @property
-    def over_limit(self) -> np.ndarray:
-        """Return which segments are over their limit by more than their error bar, (36,)."""
-        return self.rms - self.bar > self.limit
-
-    @property
-    def doubtful(self) -> np.ndarray:
-        """Return which segments may be over their limit, within their error bar, (36,)."""
-        return (self.rms + self.bar > self.limit) & ~self.over_limit
-
-
-@dataclass(frozen=True)
 class SweptRow:
     """One job: its value on the axis in words, and what its series show.
 
-    `shaking` is None, and `problem` says why, where the job has none. `cycle`: its last revolution;
-    `segments`: of its sensor's record. `chaotic`: single lines hold for this course of the motion
-    only.
+    `shaking` is None, and `problem` says why, where the job has none. `cycle`: its last revolution.
+    `chaotic`: single lines hold for this course of the motion only.
     """
 
     value: str
     shaking: analysis.Spectrum | None = None
     cycle: analysis.Cycle | None = None
-    segments: Segments | None = None
     problem: str = ""
     chaotic: bool = False
-
-    def with_segments(
-        self, run: xr.Dataset, healthy: np.ndarray, limit: tuple[float, bool] | None
-    ) -> "SweptRow":
-        """Return the row with the segments of a run that has a sensor.
-
-        healthy: rms in each segment without clearance, m/s2, (36,); limit: m/s2, or times that of
-        the healthy machine where the second is True.
-        """
-        rms = run["sensor_segment_rms"].values
-        bar = run["sensor_segment_rms_error"].values if "sensor_segment_rms_error" in run else None
-        limits = np.full(rms.size, np.nan)
-        if limit is not None:
-            limits = limit[0] * (healthy if limit[1] else np.ones(rms.size))
-        found = Segments(rms, np.zeros(rms.size) if bar is None else bar, healthy, limits)
-        return replace(self, segments=found)
 
 
 MAX_TICKS = 12
@@ -163,73 +115,6 @@ def draw_cycles(rows: Sequence[SweptRow], title: str, units: Units = "usual") ->
     return DrawnFigure(
         finish_map(drawing, peaks, "peak ({})", "m/s²", 1.08 * top), sentence, numbers
     )
-
-
-@figure("study", "segments", "vibration in segments of 10°")
-def draw_segments(rows: Sequence[SweptRow], title: str, units: Units = "usual") -> DrawnFigure:
-    """Return the rms in segments of 10 degrees over the healthy machine's, a row a value.
-
-    In colour, with marks where a segment is over its limit; beside them the greatest rms.
-    """
-    found = [row.segments for row in rows]
-    table = np.array([one.ratio if one else np.full(36, np.nan) for one in found])
-    top = max(float(np.nanmax(table)), 1.1)
-    drawing, image = start_map(rows, title, 10.0 * np.arange(36) + 5.0, table, (1.0, top),
-                               "rms over that without clearance", "", units)  # fmt: skip
-    over_limit = [one.over_limit if one else None for one in found]
-    doubtful = [one.doubtful if one else None for one in found]
-    for name, shape, color, over in (
-        ("over its limit", "square", style.RED, over_limit),
-        ("perhaps over it, by the bar", "circle", style.GOLD, doubtful),
-    ):
-        marks = [(10.0 * at + 5.0, float(n)) for n, some in enumerate(over) if some is not None
-                 for at in np.flatnonzero(some)]  # fmt: skip
-        if marks:
-            x, y = np.array(marks).T
-            image.plot(x, y, style.mark(color, shape, 4, edge=style.BLACK), name)
-    show_turn(image, 90.0)
-    greatest = np.array([np.nanmax(one.rms) if one else np.nan for one in found])
-    words = "greatest rms of a<br>segment ({})"
-    figure = finish_map(drawing, greatest, words, "m/s²", 1.08 * float(np.nanmax(greatest)))
-    sentence = (
-        "The rms of the sensor's record in 36 segments of 10°, over that of the same machine "
-        f"without clearance, {describe_rows(rows, title)}. The model has no noise of valves, so "
-        f"that a sound machine is quieter than a real one.{left_out(rows)}"
-    )
-    return DrawnFigure(figure, sentence, number_segments(rows))
-
-
-def number_segments(rows: Sequence[SweptRow]) -> list[Number]:
-    """Return the numbers of segments: the greatest, and those that are over their limits."""
-    known = [(row.segments, row.value) for row in rows if row.segments]
-    found, value = max(known, key=lambda one: np.nanmax(one[0].rms))
-    place = int(np.nanargmax(found.rms))
-    numbers = [(
-        "greatest rms",
-        f"{spell(found.rms[place], 'm/s²')} in {segment_words(place)} at {value}, "
-        f"{spell(found.ratio[place])} times that without clearance",
-    )]  # fmt: skip
-    if np.isnan(known[0][0].limit).all():
-        return numbers
-    texts = []
-    for found, value in known:
-        may = int(found.doubtful.sum())
-        perhaps = f" and perhaps {may}" * bool(may)
-        texts.append(f"{int(found.over_limit.sum())}{perhaps} at {value}")
-    numbers.append(("segments over their limit", ", ".join(texts)))
-    first = next(((found, value) for found, value in known if found.over_limit.any()), None)
-    if first:
-        found, value = first
-        place = int(np.nanargmax(np.where(found.over_limit, found.rms / found.limit, np.nan)))
-        rms, limit = (spell(values[place], "m/s²") for values in (found.rms, found.limit))
-        text = f"{segment_words(place)} at {value}, {rms} over a limit of {limit}"
-        numbers.append(("the first over it", text))
-    return numbers
-
-
-def segment_words(place: int) -> str:
-    """Return a segment's crank angles in words."""
-    return f"{10 * place} to {10 * place + 10}°"
 
 
 @figure("study", "waterfall", "order spectra of the force on the frame along the cylinder")
