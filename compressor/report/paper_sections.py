@@ -1,9 +1,8 @@
 """The sections of a report about the paper: figures, cases, claims, own machines."""
 
 import math
-import shlex
 import warnings
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -28,7 +27,6 @@ class PaperRuns:
 
     stored: dict[str, xr.Dataset]
     usable: dict[str, xr.Dataset]
-    absent: dict[str, str]  # label -> why it is not usable
 
 
 def is_of_paper(stored: Stored, study: StoredStudy) -> bool:
@@ -56,20 +54,17 @@ def find_runs(
     """Return the most exact run of the studies with each case's physics, by label."""
     labels = {case.physics_key: name for name, case in cases.items()}
     found: dict[str, xr.Dataset] = {}
-    damaged = set()
     for key in paper_candidates(stored, studies, labels):
         name = labels[str(stored.words("physics_key")[stored.position(key)])]
         try:
             run = stored.job(key)
         except store.DamagedFile as error:
             warnings.warn(str(error), store.StoreWarning, stacklevel=2)
-            damaged.add(name)
             continue
         if name not in found or rank(run) > rank(found[name]):
             found[name] = run
     usable = {name: run for name, run in found.items() if rank(run)[:2] == (True, True)}
-    absent = {n: why_absent(found.get(n), n in damaged) for n in labels.values() if n not in usable}
-    return PaperRuns({n: found[n] for n in labels.values() if n in found}, usable, absent)
+    return PaperRuns({n: found[n] for n in labels.values() if n in found}, usable)
 
 
 def paper_candidates(
@@ -89,15 +84,6 @@ def paper_candidates(
 def rank(run: xr.Dataset) -> tuple[bool, bool, float]:
     """Return the rank of a run: greater is better, among runs of the same physics."""
     return str(run["status"].item()) == "ok", "time" in run.dims, -run.attrs.get("rtol", math.inf)
-
-
-def why_absent(run: xr.Dataset | None, damaged: bool) -> str:
-    """Return why a case of the paper cannot be drawn."""
-    if run is None:
-        return "its file is damaged" if damaged else "not stored"
-    if str(run["status"].item()) != "ok":
-        return f"failed: {run['reason'].item()}"
-    return "stored without its time series"
 
 
 PAPER = FIGURES["paper"]
@@ -153,12 +139,8 @@ def comparable(runs: Collection[xr.Dataset]) -> bool:
 
 CASES = (
     "Metrics are taken over the dense solution after the start-up. A dash: nothing to tell, such "
-    "as contact in an ideal joint."
-)
-TO_GET = (
-    "compsim init paper writes a file that has all cases of the paper, and {command} runs those "
-    "that are not stored. A case that failed is run again with --rerun failed, or as a new job "
-    "once its settings change."
+    "as contact in an ideal joint. A figure is drawn if all its cases are ok and keep time series: "
+    "compsim init paper writes a file of all cases, and running it adds those that are not there."
 )
 
 
@@ -197,23 +179,6 @@ def label_in_words(name: str) -> str:
     return (
         f"{analysis.SPOKEN[fault]}, {clearance} mm" if clearance else f"{fault} model, no clearance"
     )
-
-
-def missing_sections(paper: PaperRuns, results: store.Folder) -> Iterator[page.Section]:
-    """Yield the figures that could not be drawn, what they lack, and how to get it."""
-    lacking = {
-        item.title: [name for name in item.needs if name in paper.absent] for item in PAPER.values()
-    }
-    figures = [
-        f"{title} needs "
-        + "; ".join(f"{label_in_words(name)} ({paper.absent[name]})" for name in names)
-        for title, names in lacking.items()
-        if names
-    ]
-    if figures:
-        command = f"compsim run paper.yaml -r {shlex.quote(str(results))}"
-        content = page.SectionContent(None, [TO_GET.format(command=command)], figures)
-        yield page.Section("missing", "Figures that could not be drawn", content)
 
 
 def draw_paper(

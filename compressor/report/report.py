@@ -4,7 +4,6 @@ Everything is drawn in memory before a file is written, and the page is written 
 report which is interrupted leaves the one before as it was.
 """
 
-import contextlib
 import shlex
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +20,6 @@ from compressor.cases import CardError
 from compressor.outcome import Regime
 from compressor.program import CompsimWarning
 from compressor.report import answer, interactive, page, paper_sections, study_section
-from compressor.report.figures import FIGURES
 from compressor.report.figures.pictures import draw_all
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.figures.sweep_data import measures
@@ -32,7 +30,6 @@ from compressor.store import Stored, StoredStudy
 from compressor.units import Units
 
 LIBRARY = "plotly.min.js"
-KINDS = ("png", "csv", "js")  # of files beside the page
 
 
 def write_report(
@@ -71,19 +68,17 @@ def write_report(
     for name, content in (library | files).items():
         store.publish(folder / name, content, durable=False)  # the same command makes it again
     store.publish(folder / "index.html", contents.page({}).encode(errors="backslashreplace"))
-    remove_stale(folder, contents)
     return folder / "index.html"
 
 
 class ReportContent(NamedTuple):
-    """A report that is drawn: its figures, the names of its studies, series by job, its page.
+    """A report that is drawn: its figures, series by job, its page.
 
     figures: those of the paper with their files; page: returns its text, which holds the files that
     it is given.
     """
 
     figures: list[DrawnFigure | page.ShownFigure]
-    studies: list[str]
     series: dict[str, str]
     page: Callable[[Mapping[str, bytes]], str]
 
@@ -137,7 +132,6 @@ def build_report(
         *(one.table for one in drawn),
         *tables,
         answer.assumptions_section(bool(paper.stored)),
-        *(paper_sections.missing_sections(paper, results) if papers else ()),
         answer.provenance_section(studies, results, command),
     ]
     series = {
@@ -151,7 +145,7 @@ def build_report(
     title = titles.pop() if len(titles) == 1 else ""  # several machines have it in their sections
     figures = [one for section in sections for one in getattr(section.content, "figures", ())]
     make_page = partial(page.document, sections, jobs, title)
-    return ReportContent(figures, [study.name for study in studies], series, make_page)
+    return ReportContent(figures, series, make_page)
 
 
 def choose_studies(results: store.Folder, names: Sequence[str]) -> list[StoredStudy]:
@@ -254,21 +248,3 @@ def summarise(
     cautions = [f"{text[0].upper()}{text[1:]}." for text in left_out]
     cautions += [text for one in drawn for text in one.cautions]
     return answer.FirstScreen(lines, shown, judged, cautions)
-
-
-def remove_stale(report: Path, contents: ReportContent) -> None:
-    """Remove what an earlier report drew and this one did not: the paper's figures, and series."""
-    drawn = {one.name for one in contents.figures}
-    own = (
-        study_section.file_name(study, name)
-        for study in contents.studies
-        for name in FIGURES["paper"]
-    )
-    names = {*FIGURES["paper"], *own} - drawn
-    stale = [report / f"{name}.{kind}" for name in names for kind in KINDS]
-    scripts = {f"{interactive.series_name(key)}.js" for key in contents.series}
-    before = report.glob(f"{interactive.series_name('*')}.js")
-    stale += [path for path in before if path.name not in scripts]
-    for path in stale:
-        with contextlib.suppress(OSError):
-            path.unlink()

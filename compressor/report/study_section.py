@@ -1,11 +1,11 @@
 """The section of a report about a user's own study: its failures, its table and its figures."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
 import xarray as xr
 
 from compressor.digits import plural
@@ -20,7 +20,6 @@ from compressor.report.side_by_side import HealthyAndWorn, compare_healthy
 from compressor.store import Stored, StoredStudy, study_caveats
 from compressor.units import Units
 
-MAX_DETAILS = 20
 MAX_ROWS = 500
 MAX_FACTS = 2000  # jobs whose points show where they are
 KEY_DIGITS = 10  # digits of a job's key
@@ -46,15 +45,15 @@ class Counts(NamedTuple):
 class StudyContent:
     """What a page says of a study; jobs: the id of the section with its table.
 
-    caveats: what to know beside the numbers, a sentence each; notes: lines that others add;
-    beside: the machine without clearance; inputs: what was given, swept and assumed.
+    caveats: what to know beside the numbers, a sentence each; failures: by reason, with remedies;
+    notes: lines that others add; beside: the machine without clearance; inputs: what was given,
+    swept and assumed.
     """
 
     study: StoredStudy
     counts: str
     caveats: Sequence[str]
     failures: Sequence[str]
-    remedies: Sequence[str]
     figures: Sequence[DrawnFigure]
     jobs: str
     notes: Sequence[page.StudyNote] = ()
@@ -75,14 +74,15 @@ def study_sections(
 
     notes: lines that others add to the first; limits: of metrics, whose zones the table shows.
     """
-    reasons = dict.fromkeys(data["reason"].values[data["status"].values == "failed"])
+    failed = Counter(data["reason"].values[data["status"].values == "failed"].tolist())
     anchor = file_name("jobs", study.name)
     content = StudyContent(
         study=study,
         counts=job_counts(data).text,
         caveats=study_caveats(stored, study),
-        failures=failed_jobs(stored, data),
-        remedies=[f"{reason}: {remedy(reason)}" for reason in reasons],
+        failures=[
+            f"{plural(n)} failed, {reason}: {remedy(reason)}" for reason, n in failed.items()
+        ],
         figures=figures,
         jobs=anchor,
         notes=notes,
@@ -132,23 +132,6 @@ def job_facts(data: xr.Dataset, keys: Sequence[str]) -> page.JobFacts:
         point = [page.value_cell(values[n]).text for values in swept.values()]
         found[key] = [*point, page.status_text(status[n], reason[n])]
     return page.JobFacts([*swept, "status"], found)
-
-
-def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
-    """Return the place and reason of each failed job in the sweep, the first of many."""
-    failed = np.flatnonzero(data["status"].values == "failed")
-    swept = swept_values(data)
-    rows = []
-    for place in failed[:MAX_DETAILS]:
-        position = stored.position(str(data["key"].values.flat[place]))
-        text = "gone"
-        if position is not None:
-            text = page.status_text(stored.status_at(position).reason, stored.detail(position))
-        point = [f"{name} {page.value_cell(values[place]).text}" for name, values in swept.items()]
-        rows.append(f"{', '.join(point)}: {text}")
-    if len(failed) > MAX_DETAILS:
-        rows.append(f"and {len(failed) - MAX_DETAILS} more")
-    return rows
 
 
 def jobs_table(
