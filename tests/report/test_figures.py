@@ -113,10 +113,6 @@ def test_relation(drawn, paper_runs, number, joint):
         np.testing.assert_allclose((dots.x, dots.y), (force / 1000, a), rtol=1e-13)
         slope, intercept = np.polyfit(a, force, 1)
         assert fit.x * 1000 == pytest.approx(slope * fit.y + intercept)
-        r = np.corrcoef(a, force)[0, 1]
-        (words,) = [note.text for note in panel.notes]
-        assert f"r = {r:.3f},  r² = {r * r:.3f}".replace("-", "−") in words
-        assert f"{slope:.1f} kg".replace("-", "−") in words
 
 
 def test_pressure_volume(drawn, paper_runs):
@@ -166,7 +162,6 @@ def test_cam(drawn):
     for printed in (before, after):
         angle = np.radians(printed.x)
         np.testing.assert_allclose(printed.y, cam.printed_follower(angle) * 1000)
-    assert "208.7 mm" in " ".join(note.text for note in follower.notes)
 
 
 @pytest.mark.parametrize("number", [6, 8, 9, 11, 12, 14, 15, 16])
@@ -315,6 +310,21 @@ def test_loads_are_told_by_their_peaks_and_corners(paper_runs):
     assert told(shown(6, paper_runs), "greatest difference") == [0.0] * 3
     moved = paper_runs["typical"].assign(velocity=1.01 * paper_runs["typical"]["velocity"])
     assert told(shown(6, {**paper_runs, "typical": moved}), "greatest difference")[1] > 0.1
+
+
+@pytest.mark.parametrize(("number", "joint"), [(10, "big_end"), (13, "small_end")])
+def test_a_relation_is_told_by_its_numbers(paper_runs, number, joint):
+    found, fits = shown(number, paper_runs), []
+    for size in SIZES:
+        run = paper_runs[f"{joint} {size}"].isel(time=SETTLED)
+        a, force = (
+            run["acceleration"].values,
+            run["contact_force"].sel(joint=joint, axis="x").values,
+        )
+        slope, intercept = np.polyfit(a, force, 1)
+        fits.append((slope, intercept / 1e3, np.corrcoef(a, force)[0, 1] ** 2))
+    for words, values in zip(("slope", "without", "r²"), zip(*fits, strict=True), strict=True):
+        assert told(found, words) == pytest.approx(values, rel=1e-3)
 
 
 def test_the_cam_and_the_gas_are_told_by_their_numbers(paper_runs):

@@ -215,7 +215,7 @@ def contact_force(joint: str, axis: str) -> curves.Quantity:
 @paper_figure(13, "Acceleration against horizontal contact force, small end", *sizes("small_end"),
               joint="small_end")  # fmt: skip
 def draw_relation(runs: curves.Runs, joint: str, units: Units = "usual") -> DrawnFigure:
-    """Return one panel a clearance: every stored sample, the regression line, r and r²."""
+    """Return one panel a clearance: every stored sample and the regression line."""
     drawing, panels = make_grid(1, 3, 4.0, units=units, share_x="all", share_y="all")
     for panel, letter, clearance in zip(panels.flat, "abc", analysis.CLEARANCES, strict=True):
         run = runs[analysis.label(joint, clearance)]
@@ -234,6 +234,7 @@ def draw_relation(runs: curves.Runs, joint: str, units: Units = "usual") -> Draw
     )
     numbers = [
         (f"slope at {AT}", spell([one.slope for one in found], "kg")),
+        ("force without acceleration", spell([1e-3 * one.intercept for one in found], "kN")),
         ("r²", spell([one.r2 for one in found])),
     ]
     return DrawnFigure(drawing.figure(), sentence, numbers)
@@ -247,20 +248,12 @@ def scatter(panel: Panel, run: xr.Dataset, joint: str, color: str, name: str) ->
 
 
 def regress(panel: Panel, run: xr.Dataset, joint: str) -> None:
-    """Draw the line of `force_relation` over the data's accelerations, and its numbers."""
+    """Draw the line of `force_relation` over the data's accelerations."""
     relation = analysis.force_relation(run, joint)
     a = analysis.settled_part(run)["acceleration"].values
     ends = np.array([a.min(), a.max()])
     force = (relation.slope * ends + relation.intercept) * curves.KILONEWTON
     panel.plot(force, ends, style.LineStyle(style.BLACK, linewidth=1.1), "fit", listed=False)
-    r = math.copysign(math.sqrt(relation.r2), relation.slope)
-    sign, size = "−" if relation.intercept < 0 else "+", abs(relation.intercept) * curves.KILONEWTON
-    numbers = (
-        f"r = {r:.3f},  r² = {relation.r2:.3f}\n"
-        f"F = {relation.slope:.1f} kg · a {sign} {size:.2f} kN"
-    ).replace("-", "−")
-    at, side = (0.03, "left") if relation.slope > 0 else (0.97, "right")
-    panel.write(numbers, at, 0.98, inside="xy", side=side, level="top", size=8.5)
 
 
 CLOSED = style.LineStyle(style.BLUE, (), 1.8, 2.3)
@@ -346,14 +339,8 @@ def draw_follower(panel: Panel, cam: analysis.Cam, angles: np.ndarray) -> None:
     s = cam.follower(angles) * 1e3
     panel.plot(np.degrees(angles), s, CLOSED, "closed cam, as simulated")
     height, left = (float(cam.printed_follower(turn)) * 1e3 for turn in (math.pi, fall))
-    where = math.degrees(fall)
     dots = style.LineStyle(style.RED, (1, 1.65), 1.5)
-    panel.strokes(np.array([where]), left, np.array([height]), dots)
-    panel.write(f"printed: rises by {height:.1f} mm", 150, height, shift=(0, 5), size=9)
-    text = f"and falls by {left:.1f} mm:\nit does not close"
-    panel.write(text, where, 165, shift=(-6, 0), side="right", size=9)
-    stroke = float(cam.follower(math.pi)) * 1e3
-    panel.write(f"{stroke:.0f} mm each way", 183, stroke, shift=(0, 5), size=9)
+    panel.strokes(np.degrees([fall]), left, np.array([height]), dots)
     panel.title, panel.x.dtick = "(b) follower displacement", 60.0
     panel.span("x", 0, 360)
     panel.span("y", -6, 1.12 * height)

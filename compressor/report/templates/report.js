@@ -255,8 +255,12 @@ class Figure {
         x.dtick *= Math.ceil(40 * (x.range[1] - x.range[0]) / x.dtick / room);
         x.tick0 = 0;
       }
-      (layout.annotations ?? []).filter((note) => note.xref.split(" ")[0] === name)
-        .forEach((note) => this.fit(note, x, margin.l, across));
+      const titles = (layout.annotations ?? [])
+        .filter((note) => note.name === "title" && note.xref.split(" ")[0] === name);
+      titles.forEach((note) => {
+        note.font.size = Math.max(9.2, Math.min(13, 1.75 * room / note.text.length));
+        note.text = `<b>${wrapped(note.text, room + 12, note.font.size)}</b>`;
+      });
     });
     if (isDark()) {
       data.filter((one) => one.fill).forEach((one) => { one.opacity = 0.35 * (one.opacity ?? 1); });
@@ -269,31 +273,6 @@ class Figure {
       modebar: { bgcolor: "rgba(0,0,0,0)", color: faint, activecolor: ink },
       hoverlabel: { bgcolor: paper, font: { color: ink }, namelength: -1 },
       template: { layout: { xaxis: axis, yaxis: axis } } } };
-  }
-
-  // Break a note into lines of the room it has. One that would run out of the figure moves back as
-  // far as that takes, or stands before its place.
-  fit(note, axis, start, across) {
-    const [left, right] = axis.domain;
-    if (note.name === "title") {
-      const room = across * (right - left);
-      note.font.size = Math.max(9.2, Math.min(13, 1.75 * room / note.text.length));
-      note.text = `<b>${wrapped(note.text, room + 12, note.font.size)}</b>`;
-      return;
-    }
-    const [inside, size, width] = [/domain/.test(note.xref), 11, start + across];
-    const [low, high] = axis.range ?? [0, 1];
-    const share = inside ? note.x : (note.x - low) / (high - low);
-    const at = start + across * (left + share * (right - left)); // px from the figure's left
-    const wide = (LETTER * size + 0.5) * note.text.length;
-    const over = note.xanchor === "left" ? Math.max(0, at + note.xshift + wide - width) : 0;
-    const moved = !inside && over > 0 && wide < across * (right - left) ? over : 0;
-    const before = inside ? note.x > 0.5 : over > moved && at > width / 2;
-    const room = (before || note.xanchor === "right" ? at - start - across * left : width - at) - 6;
-    note.font.size = size;
-    note.text = wrapped(note.text, room + moved, size);
-    note.xshift = before && note.xanchor === "left" ? -Math.abs(note.xshift) : note.xshift - moved;
-    if (before) note.xanchor = "right";
   }
 }
 
