@@ -11,16 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from compressor.analysis.contacts import (
-    FOLLOWING,
-    ContactSeries,
-    Impact,
-    contact_series,
-    impacts_of,
-    modes_of,
-)
+from compressor.analysis.contacts import FOLLOWING, contact_series, impacts_of, modes_of
 from compressor.analysis.runs import settled_part
-from compressor.analysis.shaking import ORDER, evenly, whole_revolutions
+from compressor.analysis.shaking import whole_revolutions
 from compressor.solve import average_bar, mean_bar
 
 if TYPE_CHECKING:
@@ -155,128 +148,20 @@ def series_error(run: "xr.Dataset", name: str, values: np.ndarray, **where: str)
     return share * math.sqrt(float(np.mean(size)))
 
 
-WINDOW = 10.0  # degrees of crank angle that count as hit by one impact or more
-SLOWEST = 0.01  # m/s: approach speed from which on a contact after flight counts as an impact
-ENERGY = 0.9  # share of the energy whose angle is reported
+def share_apart(run: "xr.Dataset", joint: str) -> BarredNumber:
+    """Return the share of crank angle in which a joint with clearance is in flight or impact.
 
-
-class Shares(NamedTuple):
-    """How a joint's contact is spread over whole revolutions: shares, 0 to 1, with their errors.
-
-    `apart`: of crank angle in flight or impact (`modes_of`). `hit`: of windows of `WINDOW`
-    degrees that an impact faster than `SLOWEST` falls into. `energy_angle`: of crank angle that
-    holds `ENERGY` of the energy of the horizontal joint force above `ORDER`, large where it rings
-    all around.
+    Over settled whole revolutions, see `modes_of`. Its error is the bar of the share of time
+    without contact, and two samples for each impact. Raises NoSeriesError where there are none.
     """
+    settled, _ = whole_revolutions(run)
 
-    apart: BarredNumber
-    hit: BarredNumber
-    energy_angle: BarredNumber
+    def share(part: "xr.Dataset") -> float:
+        series = contact_series(part, joint)
+        modes = modes_of(series, impacts_of(part, series))
+        return float((modes[:-1] != FOLLOWING).mean())
 
-
-class Evidence(NamedTuple):
-    """What is looked at: a joint in whole revolutions of a run, its impacts and high force."""
-
-    series: ContactSeries
-    settled: "xr.Dataset"
-    revolutions: int
-    hits: list[Impact]
-    high: np.ndarray  # (m,), N, along the cylinder, above `ORDER`
-
-
-def evidence(run: "xr.Dataset", joint: str) -> Evidence:
-    """Return the `Evidence` of a joint with clearance over settled whole revolutions of a run.
-
-    Raises NoSeriesError where there is none.
-    """
-    from compressor.vibration import high_pass_orders
-
-    settled, count = whole_revolutions(run)
-    force = settled["contact_force"].sel(joint=joint, axis="x").values
-    high = high_pass_orders(*evenly(settled, count, force), ORDER)
-    series = contact_series(settled, joint)
-    return Evidence(series, settled, count, impacts_of(settled, series), high)
-
-
-def find_shares(by: Evidence) -> dict[str, float]:
-    """Return the values of `Shares` by their names."""
-    from compressor.vibration import energy_angle
-
-    modes = modes_of(by.series, by.hits)
-    return {
-        "apart": float((modes[:-1] != FOLLOWING).mean()),
-        "hit": hit_share(by.hits, by.revolutions),
-        "energy_angle": energy_angle(by.high, ENERGY),
-    }
-
-
-def measure_shares(run: "xr.Dataset", joint: str) -> Shares:
-    """Return the settled shares of a joint with clearance.
-
-    The errors follow from the run's error bars. That of `apart` is the bar of the share of time
-    without contact, and two samples for each impact. That of `hit` is a window for each impact that
-    is within the velocity's error of `SLOWEST`, or within a sample of a window's edge. That of
-    `energy_angle` is its change where the energy changes as much as the force's error allows. In a
-    chaotic run all come from the scatter of its revolutions. Raises as `evidence`.
-    """
-    by = evidence(run, joint)
-    found = find_shares(by)
-    if is_chaotic(run):
-        turns = [find_shares(evidence(turn, joint)) for turn in revolutions(by.settled)]
-        errors = [mean_bar(np.array([turn[name] for turn in turns])) for name in found]
-    else:
-        errors = [apart_error(by), hit_error(by), angle_error(by)]
-    return Shares(*map(BarredNumber, found.values(), errors))
-
-
-def apart_error(by: Evidence) -> float:
-    """Return the error of the share of crank angle in flight or impact."""
-    stored_error = float(by.settled["contact_loss_fraction_error"].sel(joint=by.series.joint))
-    return stored_error + 2.0 * len(by.hits) / (by.settled.sizes["time"] - 1)
-
-
-def hit_error(by: Evidence) -> float:
-    """Return the error of the share of windows that are hit."""
-    speed = np.array([one.approach_speed for one in by.hits])
-    angle = np.array([one.crank_angle for one in by.hits])
-    doubt = series_error(by.settled, "velocity", by.settled["velocity"].values)
-    if math.isnan(doubt):
-        return math.nan
-    sample = math.degrees(float(by.settled["crank_angle"][1] - by.settled["crank_angle"][0]))
-    unsure = np.abs(angle - WINDOW * np.round(angle / WINDOW)) < sample
-    unsure = (unsure & (speed > SLOWEST - doubt)) | (np.abs(speed - SLOWEST) < doubt)
-    return float(unsure.sum()) * WINDOW / (360.0 * by.revolutions)
-
-
-def angle_error(by: Evidence) -> float:
-    """Return the error of the share of crank angle that holds `ENERGY` of the energy."""
-    from compressor.vibration import energy_angle
-
-    force = by.settled["contact_force"].sel(joint=by.series.joint).values
-    error = series_error(by.settled, "contact_force", force, joint=by.series.joint)
-    size = math.sqrt(float(np.mean(by.high**2)))
-    if math.isnan(error) or not size:
-        return error
-    share_error = min(2.0 * error / size, 0.5 * ENERGY)
-    shares = (ENERGY - share_error, ENERGY, min(ENERGY + share_error, 1.0))
-    low, found, high = (energy_angle(by.high, share) for share in shares)
-    return max(high - found, found - low)
-
-
-def compare_shares(big: Shares, small: Shares) -> str:
-    """Return the shares of a big end beside those of a small end, in words."""
-    (apart, hit, angle), (small_apart, small_hit, small_angle) = (
-        [one.value for one in shares] for shares in (big, small)
-    )
-    return (
-        f"flight and impact {apart:.1%} and {small_apart:.1%} of the angle; "
-        f"{WINDOW:g}° windows hit {hit:.1%} and {small_hit:.1%}; {ENERGY:.0%} of the energy of "
-        f"F_x above order {ORDER} in {angle:.0%} and {small_angle:.0%} of the angle"
-    )
-
-
-def hit_share(hits: Sequence[Impact], revolutions: int) -> float:
-    """Return the share of crank-angle windows (`WINDOW` degrees) that impacts fall into."""
-    angles = (360.0 * one.revolution + one.crank_angle for one in hits
-              if one.approach_speed > SLOWEST)  # fmt: skip
-    return len({angle // WINDOW for angle in angles}) * WINDOW / (360.0 * revolutions)
+    hits = impacts_of(settled, contact_series(settled, joint))
+    error = float(settled["contact_loss_fraction_error"].sel(joint=joint))
+    error += 2.0 * len(hits) / (settled.sizes["time"] - 1)
+    return measure(settled, share, error)

@@ -115,28 +115,16 @@ def shaking(run: "xr.Dataset") -> Spectrum:
     Raises NoSeriesError where its series hold no whole settled revolution, RecordError where they
     are too coarse for `ORDER`.
     """
-    from compressor.vibration import RecordError, line_amplitudes
+    from compressor.vibration import RecordError, line_amplitudes, resample_angle
 
     settled, revolutions = whole_revolutions(run)
-    force = frame_forces(settled)["shaking_force"][:, 0]
-    even, a_turn = evenly(settled, revolutions, force)
+    crank = settled["crank_angle"].values
+    a_turn = (crank.size - 1) // revolutions // 2 * 2  # even: as many samples in each turn
     if a_turn <= 2 * ORDER:
         text = f"order {ORDER} is not below {a_turn / 2:g}, half the samples a turn"
         raise RecordError(f"{text}: run it with a finer solve.output_step_deg")
+    force = frame_forces(settled)["shaking_force"][:, 0]
+    even = resample_angle(crank, force, a_turn)[: revolutions * a_turn]
     amplitudes = line_amplitudes(even, a_turn, False)
     fine = line_amplitudes(even, even.size, True)[ORDER * even.size // a_turn + 1 :]
     return Spectrum(amplitudes, math.sqrt(float(np.sum(fine**2))))  # Parseval
-
-
-def evenly(settled: "xr.Dataset", revolutions: int, values: np.ndarray) -> tuple[np.ndarray, int]:
-    """Return a signal resampled at equal crank angles, and their even number a turn.
-
-    values: a signal of `whole_revolutions`.
-    """
-    from compressor.vibration import resample_angle
-
-    crank = settled["crank_angle"].values
-    a_turn = (crank.size - 1) // revolutions // 2 * 2
-    if not a_turn:
-        raise NoSeriesError("the run has no two samples a revolution (solve.output_step_deg)")
-    return resample_angle(crank, values, a_turn)[: revolutions * a_turn], a_turn

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor import analysis, cases, program, report, store, vibration
+from compressor import analysis, cases, program, report, store
 from compressor.cases import Case
 from compressor.report import style
 from compressor.store import StoredStudy
@@ -107,12 +107,12 @@ def measure(runs: Mapping[str, xr.Dataset], failed: str = "") -> frame.Row:
     """Return the `NUMBERS` and `TEXTS` of one machine's runs by label.
 
     failed: which cases there are not, and why; margins are nan then, and of runs that are too
-    short or too coarse.
+    short.
     """
     margins = np.full((len(CLAIMS), 2), math.nan)
     try:
         margins[:] = margins if failed else analysis.claim_margins(runs)
-    except (analysis.NoSeriesError, vibration.RecordError) as error:
+    except analysis.NoSeriesError as error:
         failed = str(error)
     return {
         "margin": margins[:, 0].tolist(), "error": margins[:, 1].tolist(),

@@ -24,7 +24,6 @@ UNJUDGED = {  # study -> what it has in place, and what is said
                 "big_end 0.1: budget_steps; big_end 0.2: budget_steps"),
     "short": ({"solve": QUICK | {"duration_rev": 1.5}},
               "the run has no whole settled revolution (solve.duration_rev)"),
-    "coarse": ({"solve": QUICK | {"output_step_deg": 15}}, "sample more finely"),
     "bare": ({"output": {"keep": "metrics"}, "machine": {"rod_mass_kg": 5}},
              "; big_end 0.1: without time series; big_end 0.2: without"),
 }  # fmt: skip
