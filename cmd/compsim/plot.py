@@ -5,7 +5,7 @@ import click
 from compressor.program import did_you_mean
 from compsim import options, screen
 
-OF_JOB = ["analyst", "signals", "cards", "spectra", "orbits", "impacts"]
+OF_JOB = ["analyst", "signals", "cards", "spectra", "orbits"]
 OF_STUDY = ["cycles", "waterfall"]
 LISTED = f"of a job {', '.join(OF_JOB)}; of a study {', '.join(OF_STUDY)}"
 
@@ -60,7 +60,7 @@ def plot(words, folder, output, units, **chosen) -> int:
 
     Of a job: a revolution as an analyst reads it (the sensor's record, or the crosshead's
     acceleration, above the rod load, with reversals, valve events and impacts), its signals over
-    crank angle, spectra, orbits and impacts, beside the same machine without clearance, and cards
+    crank angle, spectra and orbits, beside the same machine without clearance, and cards
     of the gas in its cylinder. Of a study: vibration over crank angle and order spectra over a
     swept axis. Nothing but what is stored is needed, and the files
     of `gas.indicator` of a job that has any.

@@ -162,6 +162,7 @@ def test_runs_without_bars_have_margins_without_error(paper_runs):
     for run in runs.values():
         for series in ("velocity", "acceleration", "contact_force"):
             run[f"{series}_error"][...] = np.nan
+        run["contact_loss_fraction_error"][...] = np.nan
     for number in (3, 5, 6, 7):
         claim = claims(runs)[number - 1]
         assert math.isnan(claim.margin.error), number
@@ -193,7 +194,7 @@ def test_a_share_s_error_is_that_of_time_without_contact(paper_runs):
 
 
 def test_a_chaotic_share_has_the_scatter_of_its_revolutions(paper_runs):
-    """Of one, two and three quarters of a revolution in flight."""
+    """Of one, two and three quarters of a revolution in flight, and impacts after them."""
     run = paper_runs["big_end 0.2"].copy(deep=True)
     turn = np.floor(run["crank_angle"].values / (2.0 * np.pi) + 1e-9)
     flies = (np.degrees(run["crank_angle"].values) % 360) < 90.0 * turn
@@ -201,5 +202,5 @@ def test_a_chaotic_share_has_the_scatter_of_its_revolutions(paper_runs):
     run["contact_force"].loc[{"joint": "big_end"}] = np.where(flies, 0.0, 1.0)[:, None]
     run.attrs["regime"] = "chaotic"
     found = margins.share_apart(run, "big_end")
-    assert 0.45 < found.value < 0.6
+    assert 0.5 < found.value < 0.75
     assert found.error == np.inf  # by three revolutions

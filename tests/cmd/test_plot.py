@@ -93,7 +93,7 @@ def test_a_job_is_drawn_with_its_numbers(plot, folder, unpainted):
     drawn = [name for name in FIGURES["job"] if name != "cards"]  # there is no gas
     assert [*found] == [f"plots/{mine[:10]}-{name}.png" for name in drawn]
     run = job(folder, "worn", 3)
-    analyst, signals, spectra, orbits, impacts = found.values()
+    analyst, signals, spectra, orbits = found.values()
     force, last = frame_forces(run), slice(2 * 720, None)
     x = force["shaking_force"][last, 0] / 1e3
     assert f"along the cylinder: {spell(x.min())} to {spell(x.max())} kN" in signals
@@ -108,9 +108,6 @@ def test_a_job_is_drawn_with_its_numbers(plot, folder, unpainted):
     assert f"gap: {spell(1e6 * run['penetration'].values[last, 0].max())} µm" in orbits
     off = (run["penetration"].values[last, 0] < 0).mean()
     assert f"off its wall: {spell(100 * off, '%')} of the time" in orbits
-    told = float(re.search(r"Impacts a revolution at the big end: ([\d.]+)", impacts)[1])
-    counted = float(run["impacts_per_rev"].sel(joint="big_end"))
-    assert 0.9 * counted <= told <= 1.001 * counted  # some lie between two samples
 
 
 def peak(run, last):

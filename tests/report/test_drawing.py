@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
 from compressor.report.figures import pictures
-from compressor.report.figures.drawing import as_csv, make_grid, outline_cells
+from compressor.report.figures.drawing import as_csv, make_grid
 from compressor.report.figures.style import LineStyle, fill, mark, palette
 from compressor.report.interactive import MAX_POINTS, extremes, script
 
@@ -145,14 +145,6 @@ def test_a_script_breaks_out_of_nothing():
     assert json.loads(name) == "one"
     (trace,) = json.loads(data)["data"]
     assert trace["name"] == "</script><script>alert(1)</script>"
-
-
-def test_outlines_hold_the_cells_that_are_in():
-    x, y = outline_cells(np.arange(4.0), np.arange(3.0), np.array([[1, 1, 0], [0, 0, 1]], bool))
-    first, second = np.split(np.stack([x, y]), np.flatnonzero(np.isnan(x)), axis=1)
-    assert (first.min(axis=1).tolist(), first.max(axis=1).tolist()) == ([0, 0], [2, 1])
-    assert np.nanmin(second, axis=1).tolist() == [2, 1]
-    assert np.nanmax(second, axis=1).tolist() == [3, 2]
 
 
 def test_a_word_that_is_a_number_stands_in_the_table():

@@ -129,8 +129,6 @@ class Panel:
             x=self.at("x", x), y=self.at("y", y), name=name, opacity=style.alpha, mode="none",
             fill="toself", fillcolor=style.color,
         )  # fmt: skip
-        if style.is_hatched:
-            made.fillpattern = {"shape": "/", "fgcolor": style.edge, "bgcolor": style.color}
         self.add(made, style.zorder, (), name)
 
     def strokes(self, x: np.ndarray, low: float, high: np.ndarray, style: LineStyle) -> None:
@@ -366,21 +364,6 @@ def rectangle(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return x and y of the outline around some places."""
     (left, right), (low, high) = (x.min(), x.max()), (y.min(), y.max())
     return np.array([left, right, right, left, left]), np.array([low, low, high, high, low])
-
-
-def outline_cells(
-    x: np.ndarray, y: np.ndarray, is_in: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Return x and y of the outlines of a map's cells that are in, those beside each other as one.
-
-    x, y: the cells' edges; is_in: shape (rows, columns).
-    """
-    found = []
-    for row, cells in enumerate(is_in):
-        steps = np.diff(np.concatenate([[0], cells, [0]]).astype(int))
-        for ends in zip(np.flatnonzero(steps > 0), np.flatnonzero(steps < 0), strict=True):
-            found.append(np.stack(rectangle(x[[*ends]], y[row : row + 2]), axis=1))
-    return join_with_gaps(found)
 
 
 def join_with_gaps(parts: Iterable[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

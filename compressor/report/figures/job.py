@@ -1,4 +1,4 @@
-"""Figures of one job: signals, cards, spectra, orbits, impacts."""
+"""Figures of one job: a revolution, signals, cards, spectra, orbits."""
 
 from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
@@ -300,7 +300,7 @@ def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
             plot_lines(panel, found.amplitudes, line, NAMES[name])
             numbers.append((label, spell(found.above, "N")))
     panel.x.title = ORDERS_AXIS
-    sentence = "Peak amplitudes over the settled revolutions."
+    sentence = f"Peak amplitudes over the settled revolutions; dashed: order {analysis.ORDER}."
     return DrawnFigure(drawing.figure(), sentence + caution(run), numbers)
 
 
@@ -317,8 +317,6 @@ def plot_lines(panel: Panel, amplitudes: np.ndarray, line: style.LineStyle, name
     panel.span("x", 0, orders[-1])
     if not panel.rules:
         panel.rule(MARK, x=analysis.ORDER)
-        order, text = analysis.ORDER, f"order {analysis.ORDER}"
-        panel.write(text, order, 1, style.RED, "y", (4, -4), level="top", size=8.5)
 
 
 @figure("job", "orbits", "orbits of the journals", "clearance")
@@ -369,43 +367,3 @@ def show_turn(panel: Panel, step: float = 45.0) -> None:
     panel.label("x", curves.ANGLE_AXIS, "°")
     panel.span("x", 0.0, 360.0)
     panel.x.dtick = step
-
-
-@figure("job", "impacts", "contacts that begin, over crank angle", "clearance")
-def draw_impacts(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
-    """Return the approach speed of the impacts of all settled revolutions over the crank angle.
-
-    Of oiled joints, whose film takes the blow, it is that of dry contacts that begin.
-    """
-    found = analysis.impacts(run)
-    kind, none = "impacts", "no impact: no journal came back from flight"
-    if analysis.case_of(run).lubricant:
-        kind, none = "dry contacts", "no dry contact begins"
-    drawing, panels = make_grid(1, 1, 3.6, units=units)
-    (panel,) = panels.flat
-    panel.label("y", "approach speed ({})", "m/s")
-    turns, numbers = analysis.settled_revolutions(run), []
-    for joint in analysis.joints_with_clearance(run):
-        color, shape = BY_JOINT[joint]
-        mine = [one for one in found if one.joint == joint]
-        angle = np.array([one.crank_angle for one in mine])
-        speed = np.array([one.approach_speed for one in mine])
-        name = f"{analysis.SPOKEN[joint]}: {angle.size / turns:.3g} {kind} a revolution"
-        panel.strokes(angle, 0.0, speed, style.LineStyle(color, linewidth=0.8))
-        panel.plot(angle, speed, style.mark(color, shape, 5), name)
-        numbers.append(
-            (f"{kind} a revolution at the {analysis.SPOKEN[joint]}", spell(angle.size / turns))
-        )
-        if angle.size:
-            fastest = int(np.argmax(speed))
-            text = f"{spell(speed[fastest], 'm/s')} at {angle[fastest]:.0f}°"
-            numbers.append(("the fastest", text))
-    if not found:
-        panel.write(none, 180, 0.5, inside="y", side="center")
-        panel.span("y", 0, 1)
-        panel.y.tickvals = ()
-    else:
-        panel.span("y", low=0)
-    show_turn(panel)
-    sentence = "Contacts that begin after settling: their approach speed over crank angle."
-    return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)

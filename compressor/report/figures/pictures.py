@@ -276,12 +276,7 @@ def area_look(trace: Trace) -> dict[str, Any]:
     """Return the keywords of an area of matplotlib."""
     if isinstance(trace, go.Bar):
         return {"facecolor": trace.marker.color, "linewidth": 0.0}
-    is_hatched = bool(trace.fillpattern.shape)
-    return {
-        "facecolor": trace.fillcolor, "linewidth": 0.0, "alpha": trace.opacity,
-        "edgecolor": trace.fillpattern.fgcolor if is_hatched else "none",
-        "hatch": "////" if is_hatched else None,
-    }  # fmt: skip
+    return {"facecolor": trace.fillcolor, "linewidth": 0.0, "alpha": trace.opacity}
 
 
 def legend_handle(trace: Trace) -> Artist:

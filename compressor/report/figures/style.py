@@ -16,8 +16,7 @@ class LineStyle:
 
     dash: lengths of strokes and gaps in widths of the line, () of a solid one; linewidth and
     markersize: in points, of a line that is not drawn 0; marker: plotly's name of it, "" without;
-    edge: colour of the marks' outline, "" as the rest; is_hollow: marks are outlines alone;
-    is_hatched: the area is, in colour `edge`.
+    edge: colour of the marks' outline, "" as the rest; is_hollow: marks are outlines alone.
     """
 
     color: str
@@ -29,7 +28,6 @@ class LineStyle:
     edge: str = ""
     edge_width: float = 1.0
     is_hollow: bool = False
-    is_hatched: bool = False
     alpha: float = 1.0
 
     @property

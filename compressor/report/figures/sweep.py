@@ -83,9 +83,9 @@ def draw_grid(
     if len(sweep.axes) == 2 and first.is_words == second.is_words:
         title = f"metrics over {first.phrase} and {second.phrase}"
         cut = [number for axis in sweep.axes for number in count_drawn(axis, sweep_maps.MAX_CELLS)]
-        maps = sweep_maps.draw_maps(sweep, shown, limits)
-        yield DrawnFigure(maps, "A cell a job.", [*cut, *about], zone_words(shown, limits), "map",
-                          title)  # fmt: skip
+        sentence = "A cell a job; one without colour lacks the metric."
+        maps = sweep_maps.draw_maps(sweep, shown)
+        yield DrawnFigure(maps, sentence, [*cut, *about], zone_words(shown, limits), "map", title)
         return
     role = sweep_panels.roles_of(sweep, order)
     x, color = (sweep.axes[n] for n in role)

@@ -10,8 +10,7 @@ import plotly.graph_objects as go
 
 from compressor import analysis
 from compressor.report.figures import style, sweep_panels
-from compressor.report.figures.contours import contour_lines
-from compressor.report.figures.drawing import Panel, Way, make_grid, midway, outline_cells
+from compressor.report.figures.drawing import Panel, Way, make_grid
 from compressor.report.figures.sweep_data import (
     MARKS,
     NAMES,
@@ -21,11 +20,9 @@ from compressor.report.figures.sweep_data import (
     coarse,
     spans_decades,
 )
-from compressor.report.limits import NO_LIMITS, Limits
 
 COLORS = "cividis"
 MAX_CELLS = 64  # along an axis
-NOTHING = style.fill("#f2f2f2", edge=style.GREY, is_hatched=True)
 
 
 def orient_axes(sweep: PlottedSweep) -> tuple[int, int]:
@@ -48,12 +45,10 @@ class Cells(NamedTuple):
         return x.places, y.places
 
 
-def draw_maps(
-    sweep: PlottedSweep, measures: Sequence[Measure], limits: Limits = NO_LIMITS
-) -> go.Figure:
+def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> go.Figure:
     """Return a map of every measure over both axes of a grid, a cell a job.
 
-    At most MAX_CELLS along an axis. Over two axes of numbers, limits of a measure are lines.
+    At most MAX_CELLS along an axis.
     """
     in_x, in_y = orient_axes(sweep)
     sweep = coarse(coarse(sweep, 0, MAX_CELLS), 1, MAX_CELLS)
@@ -65,17 +60,13 @@ def draw_maps(
     status, chaotic = table(sweep.status), table(sweep.chaotic)
     cells = Cells((x, y), table(sweep.keys))
     drawing = sweep_panels.metric_panels(measures, 2.6, "all", "all")
-    tables = [table(measure.of(sweep.data)) for measure in measures]
-    for panel, measure, values in zip(drawing.panels, measures, tables, strict=True):
+    for panel, measure in zip(drawing.panels, measures, strict=True):
         panel.label("y", "")  # the colours have the unit
-        plot_map(panel, cells, values, measure)
-        plot_limits(panel, cells, values, limits.of(measure))
+        plot_map(panel, cells, table(measure.of(sweep.data)), measure)
         mark_cells(panel, cells, status, chaotic)
         scale_map(panel, "x", x, sweep_panels.in_lines(x.words))
         scale_map(panel, "y", y, y.words)
         panel.x.title, panel.y.title = x.title, y.title
-    if any((np.isnan(values) & (status == "ok")).any() for values in tables):
-        drawing.list_area("the job lacks this metric", NOTHING)
     return drawing.figure()
 
 
@@ -84,19 +75,10 @@ def plot_map(panel: Panel, cells: Cells, table: np.ndarray, measure: Measure) ->
     panel.x.showgrid = panel.y.showgrid = False
     low, high = float(np.nanmin(table)), float(np.nanmax(table))
     top = high if high > low else low + (abs(low) or 1.0)
-    x, y = (midway(c, axis.is_log) for c, axis in zip(cells.centres, cells.axes, strict=True))
-    panel.fill(*outline_cells(x, y, np.isnan(table)), NOTHING)
     panel.map(
         *cells.centres, table, style.palette(COLORS), (low, top), "{}", measure.unit,
         spans_decades(table), measure.title, sweep_panels.job_keys(cells.keys),
     )  # fmt: skip
-
-
-def plot_limits(panel: Panel, cells: Cells, table: np.ndarray, limits: Sequence[float]) -> None:
-    """Draw lines where a measure is at its limits, if that is within two axes of numbers."""
-    inside = tuple(one for one in limits if np.nanmin(table) < one < np.nanmax(table))
-    if inside and min(table.shape) > 1 and not any(axis.is_words for axis in cells.axes):
-        panel.plot(*contour_lines(*cells.centres, table, inside), sweep_panels.LIMIT)
 
 
 def mark_cells(panel: Panel, cells: Cells, status: np.ndarray, chaotic: np.ndarray) -> None:

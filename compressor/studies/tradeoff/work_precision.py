@@ -177,13 +177,13 @@ LOOKS: dict[str, tuple[Any, ...]] = {
 }
 OTHER = (MID, (), 1.0, 2.0, "circle", "")
 TIER = style.mark(style.BLUE, "circle", 9.5, 4, is_hollow=True)
-DISAGREE = style.fill("#f0f0f0", zorder=0, edge="#c9c9c9", is_hatched=True)
+DISAGREE = style.fill("#e4e4e4", zorder=0)
 
 
 def draw_work_precision(study: xr.Dataset) -> report.PlotlyFigure:
     """Return a panel a scene: error of acceleration over wall time, a line a method.
 
-    Rings mark the tolerances behind the words of `accuracy`; in the hatched band the references
+    Rings mark the tolerances behind the words of `accuracy`; in the grey band the references
     themselves disagree.
     """
     count = study.sizes["scene"]
