@@ -125,7 +125,7 @@ def write_case_files(place):
 
 def test_case_files_have_the_jobs_that_they_say(tmp_path):
     jobs = write_case_files(tmp_path)
-    assert len(jobs) == 14
+    assert len(jobs) == 15
     for name, count in jobs.items():
         (study,) = load_studies(tmp_path / name)
         assert len(study.cases) == int(count or 6), name

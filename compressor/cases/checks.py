@@ -188,7 +188,7 @@ def of_other_quantity(name: str, group: str, value: Any) -> str:
 
 # keys of a case file that are no part of a case: how values are swept together, what the page of
 # the report says of the machine
-SWEEP = ("sample", "zip", "blocks", "report")
+SWEEP = ("sample", "zip", "exclude", "blocks", "report")
 MAX_MEANT = 3  # keys of one name, or with the same words in it, that are told
 
 

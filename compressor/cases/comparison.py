@@ -2,7 +2,7 @@
 
     clearance_mm >= 0.2 and not (load == none or machine.speed_rpm < 300)
 
-They select jobs (`--only`), and say under which condition a case reads a key. Python's
+They select jobs (`--only`, `exclude`), and say under which condition a case reads a key. Python's
 parser reads a text into a tree; only comparisons may be in it, and nothing is ever run. Values mean
 what they mean in a case file: `true` is a boolean and `none` a word. Numbers are compared by size,
 words only with `==` and `!=`. A key that has no value differs from every value.

@@ -28,9 +28,14 @@ def case_schema() -> Schema:
     found = {key: _group(key) if key in GROUPS else _value_or_parts(key) for key in keys}
     swept = {"enum": [key for key in (*parts_by_key(), *table()) if key not in outside_identity()]}
     group = {"type": "array", "items": swept, "minItems": 2, "uniqueItems": True}
+    text = {"type": "string"}
     found |= {
         "sample": _group_of_file(Sample),
         "zip": {"description": "keys whose values advance together", **_list(group)},
+        "exclude": {
+            "description": "comparisons; jobs for which one holds are left out",
+            "anyOf": [text, _list(text)],
+        },
         "report": _group_of_file(Report),
     }
     block = _mapping({key: item for key, item in found.items() if key not in WHOLE_FILE})

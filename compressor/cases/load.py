@@ -25,7 +25,7 @@ from compressor.cases.keys import (
     read_overrides,
 )
 from compressor.cases.parameter import CaseError, choice, make_group
-from compressor.cases.study import Axis, Block, Cases, Located, Study, draws, plan_block, read_own
+from compressor.cases.study import Axis, Block, Cases, Located, Study, plan_block, read_own, reader
 from compressor.cases.table import WORDS, outside_identity, table
 from compressor.cases.yaml_reader import (
     START,
@@ -210,6 +210,11 @@ def _study(
     return study, blocks
 
 
+def draws(block: Block) -> bool:
+    """Return whether a block draws values of any key."""
+    return any(sweep.is_drawn for sweep in block.sweeps.values())
+
+
 def _blocks(file: CaseFile, max_jobs: int) -> list[Block]:
     """Return the blocks of a file.
 
@@ -225,7 +230,10 @@ def _blocks(file: CaseFile, max_jobs: int) -> list[Block]:
         raise CaseFileError([*problems, too_many])
     told = {one.key for one in file.problems}
     for block in blocks:
-        problems += [one for one in block.find_repeated() if one.key not in told]
+        repeated = [one for one in block.find_repeated() if one.key not in told]
+        problems += repeated
+        if block.combinations and not (repeated or block.numbers):
+            problems.append(block.tree.problem(("exclude",), "leaves no job"))
     if not problems and not file.problems:
         return blocks
     found: Located = {}  # what is wrong with single values is told in the same run
@@ -269,10 +277,10 @@ def _block_trees(tree: Tree, changes: Tree, max_jobs: int) -> tuple[list[Tree], 
 
 def _find_too_many(blocks: Sequence[Block], max_jobs: int) -> FileProblem | None:
     """Return the problem of more jobs than may be made."""
-    total = sum(block.jobs for block in blocks)
+    total = sum(block.combinations for block in blocks)
     if total <= max_jobs:
         return None
-    largest = max(blocks, key=lambda block: block.jobs)
+    largest = max(blocks, key=lambda block: block.combinations)
     key = max(largest.factors, key=largest.size)[0]
     many = Decimal(total)  # which may be beyond any float
     message = f"{many:.20g} jobs are more than {max_jobs}: ask for fewer, or raise --max-jobs"
@@ -337,12 +345,7 @@ def _check_cases(
 
 def is_selected(only: Test, given: Mapping[str, Any], case: Case) -> bool:
     """Return whether a comparison holds for a job; given: nested values of the file."""
-
-    def value(key: str) -> Any:
-        told = value_of(given, key)
-        return value_of(case, key) if told is None else told
-
-    return only(value)
+    return only(reader(given, lambda: case))
 
 
 def axis_value(case: Case, given: Mapping[str, Any], key: str) -> Any:
@@ -385,7 +388,7 @@ def _find_unread(blocks: Sequence[Block]) -> dict[Where, FileProblem]:
             if where not in read and (row_of(key) or key in WORDS) and not is_off(key, value):
                 is_swept = key in block.sweeps
                 wanted[where] = conditions(key) if is_swept else needs_of_given(key, block.given)
-        for number in range(block.jobs) if wanted else ():
+        for number in block.numbers if wanted else ():
             case = block.case(number)
             for where, needs in [*wanted.items()]:
                 unmet = next((one for one in needs if not condition(one[1])(case)), None)

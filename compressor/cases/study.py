@@ -11,7 +11,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import Any
 
 from compressor.cases.card import CardError, mark_card
@@ -28,11 +28,15 @@ from compressor.cases.checks import (
     value_of,
     walk_leaves,
 )
+from compressor.cases.comparison import NoComparison, Test, comparison
+from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.keys import drop, path_of, put
 from compressor.cases.parameter import CaseError, integer, make_group, quote_value
 from compressor.cases.swept import FORMS, NoSweep, Sweep, design, design_size, sweep_of
 from compressor.cases.table import outside_identity
 from compressor.cases.yaml_reader import FileProblem, Place, Tree
+
+RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
 
 Factors = list[tuple[str, ...]]  # keys that advance together
 Located = dict[tuple[Place, str], FileProblem]  # by the place and the key that a problem is about
@@ -40,7 +44,7 @@ Located = dict[tuple[Place, str], FileProblem]  # by the place and the key that 
 
 @dataclass(frozen=True)
 class Block:
-    """The jobs of a block: every combination of its factors' values, in C order.
+    """The jobs of a block: every combination of its factors' values, but for those left out.
 
     name: of the study. `given` has what is given by dotted key, `fixed` what is not swept of it,
     nested, and `sweeps` how the rest is, with the `sample` of a design.
@@ -53,11 +57,13 @@ class Block:
     sweeps: dict[str, Sweep]
     factors: Factors
     sample: "Sample"
+    exclusions: list[Test]
 
     @property
     def is_grid(self) -> bool:
-        """Return whether every key is an axis of its own."""
-        return not draws(self) and all(len(keys) == 1 for keys in self.factors)
+        """Return whether every key is an axis of its own, and no combination is left out."""
+        drawn = any(sweep.is_drawn for sweep in self.sweeps.values())
+        return not (self.exclusions or drawn or any(len(keys) > 1 for keys in self.factors))
 
     def size(self, keys: tuple[str, ...]) -> int:
         """Return how many values keys that advance together have."""
@@ -65,8 +71,8 @@ class Block:
         return sweep.count or design_size(sweep.kind, self.sample.n or 0, len(keys))
 
     @property
-    def jobs(self) -> int:
-        """Return how many jobs there are."""
+    def combinations(self) -> int:
+        """Return how many jobs there are with those that are left out."""
         return math.prod(map(self.size, self.factors))
 
     @cached_property
@@ -102,6 +108,15 @@ class Block:
         """
         return cache(mark_path)
 
+    @cached_property
+    def numbers(self) -> Sequence[int]:
+        """Return the numbers of the combinations that are not excluded, in C order."""
+        every = range(math.prod(len(self.columns[keys[0]]) for keys in self.factors))
+        if not self.exclusions:
+            return every
+        jobs = ((n, reader(self.given_of(n), partial(self._case_if_any, n))) for n in every)
+        return [number for number, job in jobs if not any(test(job) for test in self.exclusions)]
+
     def rows_of(self, number: int) -> dict[str, int]:
         """Return which of its values each swept key has in one combination."""
         found: dict[str, int] = {}
@@ -135,6 +150,12 @@ class Block:
             if isinstance(card := value_of(values, key), str):
                 values = put(values, path_of(key), self.mark(key, card))
         return Case.resolve(values)
+
+    def _case_if_any(self, number: int) -> Case | None:
+        """Return the case of one combination, None where its values do not fit."""
+        with contextlib.suppress(CaseError):
+            return self.case(number)
+        return None
 
     def each_value(self) -> Iterator[dict[str, int]]:
         """Yield rows of the swept keys in which each value stands once at least."""
@@ -189,9 +210,23 @@ def mark_path(key: str, path: str) -> str:
     return path
 
 
-def draws(block: Block) -> bool:
-    """Return whether a block draws values of any key."""
-    return any(sweep.is_drawn for sweep in block.sweeps.values())
+def reader(given: Mapping[str, Any], case: Callable[[], Case | None]) -> Callable[[str], Any]:
+    """Return the function that gives a job's value of a key: as given, the default, or the case's.
+
+    given: nested values without synonyms. case: makes the job's case, and is called only for what
+    a case fills in by other keys, such as the inertia of a uniform rod.
+    """
+
+    def value(key: str) -> Any:
+        found, row = value_of(given, key), row_of(key)
+        if found is not None or not row:
+            return found
+        if row.default is None or stands_for(key):
+            return value_of(case(), key)
+        has_rival = key in RIVALS and value_of(given, RIVALS[key]) is not None
+        return None if has_rival else row.default
+
+    return value
 
 
 def plan_block(tree: Tree, name: str) -> tuple[Block, list[FileProblem]]:
@@ -221,11 +256,12 @@ def plan_block(tree: Tree, name: str) -> tuple[Block, list[FileProblem]]:
             problems.append(FileProblem(tree.at(*path, *error.path)[1], key, str(error)))
     sample, wrong_design = _design_of(tree, sweeps)
     groups, wrong_zip = _zip_groups(tree, sweeps, {problem.key for problem in problems})
+    exclusions, wrong_tests = _exclusions(tree)
     drawn = tuple(key for key, sweep in sweeps.items() if sweep.is_drawn)
     together = {key: group for group in [drawn, *groups] for key in group}
     factors = [*dict.fromkeys(together.get(key, (key,)) for key in sweeps)]
-    block = Block(name, tree, given, fixed, sweeps, factors, sample)
-    return block, [*problems, *wrong_design, *wrong_zip]
+    block = Block(name, tree, given, fixed, sweeps, factors, sample, exclusions)
+    return block, [*problems, *wrong_design, *wrong_zip, *wrong_tests]
 
 
 def is_swept(key: str, value: Any) -> bool:
@@ -331,6 +367,19 @@ def _tell_zip(sweeps: dict[str, Sweep], keys: Any, taken: Sequence[str]) -> str:
     return ""
 
 
+def _exclusions(tree: Tree) -> tuple[list[Test], list[FileProblem]]:
+    """Return the comparisons of `exclude`; where one holds, a combination is left out."""
+    value = tree.values.get("exclude", [])
+    texts = value if isinstance(value, list) else [value]
+    tests, problems = [], []
+    for number, text in enumerate(texts):
+        try:
+            tests.append(comparison(text))
+        except NoComparison as error:
+            problems.append(FileProblem(tree.at("exclude", number)[1], "exclude", str(error)))
+    return tests, problems
+
+
 @dataclass(frozen=True)
 class Axis:
     """One swept key of a study, such as `machine.rod_mass_kg`, and its values."""
@@ -396,7 +445,7 @@ class Cases(Sequence[Case]):
 
     def __init__(self, blocks: Sequence[Block]):
         self.blocks = blocks
-        self.ends = [*itertools.accumulate(block.jobs for block in blocks)]
+        self.ends = [*itertools.accumulate(len(block.numbers) for block in blocks)]
         self.keys: Sequence[str] = ()
 
     def __len__(self) -> int:
@@ -405,11 +454,11 @@ class Cases(Sequence[Case]):
     def place_of(self, index: int) -> tuple[Block, int]:
         """Return the block of a case, and the number of its combination there."""
         at = bisect_right(self.ends, index)
-        return self.blocks[at], index - self.ends[at] + self.blocks[at].jobs
+        return self.blocks[at], self.blocks[at].numbers[index - self.ends[at]]
 
     def places(self) -> Iterator[tuple[Block, int]]:
         """Yield the block and the number in it of each case."""
-        return ((block, number) for block in self.blocks for number in range(block.jobs))
+        return ((block, number) for block in self.blocks for number in block.numbers)
 
     def __getitem__(self, index: Any) -> Any:
         number = range(len(self))[index]

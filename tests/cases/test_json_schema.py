@@ -21,7 +21,7 @@ OTHERS = [
     "solve: {max_steps: {range: [10, 30, 10]}, error_bars: false}",
     "joint: both\nclearance_mm: {big_end: 0.1, small_end: [0.1, 0.2]}",
     "joint: both\nclearance_mm: {random: [0.01, 1], log: true}\nsample: {n: 2, seed: 3}",
-    "load: [none, spring]\nfriction: false",
+    "load: [none, spring]\nexclude: [load == none]\nfriction: false",
     "joint: both\nclearance_mm: 0.1\nmachine: {pin_radius_mm: {big_end: [50, 60], small_end: 35}}",
 ]
 

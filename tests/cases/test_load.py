@@ -189,9 +189,9 @@ YAMLISH = st.lists(st.sampled_from([*WORDS.split(), *SIGNS.split(), *GAPS]), max
 SWEEPS = [
     "clearance_mm: {linspace: [0.1, 0.3, 3]}", "clearance_mm: {random: [1, 2]}", "load: [none]",
     "machine: {speed_rpm: {lhs: [300, 900], log: true}}", "sample: {n: 3}", "sample: {seed: 1}",
-    "zip: [[load, clearance_mm]]",
+    "zip: [[load, clearance_mm]]", "exclude: load == none", "exclude: [load == none]",
     "blocks: [{load: none}, {joint: both, sample: {n: 2}}]", "joint: big_end", "zip: {}",
-    "blocks: [1]", "sample: {n: [1, 2]}", "zip: [[[load]]]",
+    "blocks: [1]", "exclude: {load: none}", "sample: {n: [1, 2]}", "zip: [[[load]]]",
 ]  # fmt: skip
 SWEPT = st.lists(st.sampled_from(SWEEPS), max_size=6, unique=True).map("\n".join)
 

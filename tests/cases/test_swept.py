@@ -122,6 +122,12 @@ def test_a_design_draws_its_keys_together(read, kind):
     assert rows(read(SAMPLED % (kind, kind), overrides=["sample.seed=6"])) != found
 
 
+def test_of_what_is_drawn_some_may_be_excluded(read):
+    every, slow = (rows(read(SAMPLED % ("lhs", "lhs") + more))
+                   for more in ("", "exclude: machine.speed_rpm > 700"))  # fmt: skip
+    assert slow == [row for row in every if row[1] <= 700]
+
+
 @pytest.mark.parametrize("kind", ["random", "lhs", "sobol"])
 def test_whole_numbers_are_drawn_as_such(read, kind):
     text = f"{ONE}clearance_mm: 0.2\nbody: true\nsensor: {{seed: {{{kind}: [1, 900]}}}}\n"
@@ -142,7 +148,14 @@ def test_saltelli_exchanges_one_key_after_another(read):
     assert design_size("saltelli", 8, 2) == 32 == len(design("saltelli", 8, 2, 1))
 
 
-# ---- selected, and put together ------------------------------------------------------------------
+# ---- left out, and put together -----------------------------------------------------------------
+
+
+def test_what_does_not_fit_may_be_excluded(read):
+    text = "machine: {crank_radius_mm: [100, 700], rod_length_mm: [600, 800]}\nload: none\n"
+    assert len(refused(read, text)) == 1
+    study = read(text + "exclude: machine.crank_radius_mm == 700 and machine.rod_length_mm < 700\n")
+    assert len(study.cases) == 3
 
 
 OWN = "load: gas\nmachine: {rod_mass_kg: [4, 6]}\ngas: {discharge_MPa: [0.393, 0.5]}\n"
@@ -162,15 +175,21 @@ LOADS = ONE + "clearance_mm: {big_end: 0.2}\nload: [none, spring]\n"
         (LOADS, "clearance_mm == 0.2 and load == none", [0]),
         (LOADS, "machine.speed_rpm == 500 and load == none", [0]),
         (LOADS, "clearance_mm.small_end > 0", []),
-        (LOADS, "lubricant.viscosity_mPa_s > 20", []),  # which a dry joint has not
     ],
 )  # fmt: skip
 def test_a_comparison_sees_what_a_case_fills_in(read, text, condition, jobs):
-    """And what is not swept."""
+    """And what is not swept: selected are the very jobs that are left out by the same text."""
+    every = read(text)
+    keys = [every.keys[number] for number in range(every.jobs) if number not in jobs]
     if jobs:
         assert [*read(text, only=condition).selected] == jobs
     else:
         assert "selects no job" in refused(read, text, only=condition)[0]
+    without = f"{text}exclude: {condition}\n"
+    if keys:
+        assert [*read(without).keys] == keys
+    else:
+        assert "leaves no job" in refused(read, without)[0]
 
 
 def test_a_block_without_a_cylinder_of_its_own_has_the_corners_of_the_paper(read):
@@ -178,6 +197,12 @@ def test_a_block_without_a_cylinder_of_its_own_has_the_corners_of_the_paper(read
     assert [*read(text, only="gas.switching == paper").selected] == [0]
     with_a_cylinder = "gas.switching == exact and gas.valve_loss_percent == 0"
     assert [*read(text, only=with_a_cylinder).selected] == [1]
+
+
+def test_what_has_no_case_is_not_left_out_by_what_a_case_would_fill_in(read):
+    text = "machine: {crank_radius_mm: [100, 700]}\nload: none\n"
+    (message,) = refused(read, text + "exclude: machine.rod_inertia_kg_m2 > 1\n")
+    assert "must be shorter than the rod" in message
 
 
 def test_blocks_stand_one_after_the_other(read):
@@ -209,19 +234,21 @@ OWN_VALUES = {"machine.counterweight_kg_mm": (0, 500, 0), "clearance_mm": (0.1, 
     ("text", "axes"),
     [
         # also of 0, which a case writes as no counterweight
+        ("clearance_mm: [0.1, 0.2]\nmachine: {counterweight_kg_mm: [0, 500]}\n"
+         "exclude: clearance_mm == 0.2 and machine.counterweight_kg_mm == 500\n", OWN_VALUES),
         ("machine: {counterweight_kg_mm: [0, 500, 0]}\nclearance_mm: [0.1, 0.1, 0.2]\n"
          "zip: [[clearance_mm, machine.counterweight_kg_mm]]\n", OWN_VALUES),
         ("blocks: [{machine: {counterweight_kg_mm: [0, 500]}, clearance_mm: 0.1}, "
          "{machine: {counterweight_kg_mm: 0}, clearance_mm: 0.2}]\n", OWN_VALUES),
         # words that a case writes as none
-        ("clearance_mm: 0.2\nfriction: {law: [adams, adams, lugre], "
-         "ideal_joints: [false, true, false]}\nzip: [[friction.law, friction.ideal_joints]]",
+        ("clearance_mm: 0.2\nfriction: {law: [adams, lugre], ideal_joints: [false, true]}\n"
+         "exclude: friction.law == lugre and friction.ideal_joints == true",
          {"friction.law": ("adams", "adams", "lugre"),
           "friction.ideal_joints": (False, True, False)}),
         # the law of a job reads no coefficient of restitution, another one does
-        ("clearance_mm: 0.2\ncontact: {law: [hertz, flores, flores], restitution: [0.5, 0.5, "
-         "0.9], materials: [steel, steel], geometry: [external, internal]}\n"
-         "zip: [[contact.law, contact.restitution]]",
+        ("clearance_mm: 0.2\ncontact: {law: [hertz, flores], restitution: [0.5, 0.9], "
+         "materials: [steel, steel], geometry: [external, internal]}\n"
+         "exclude: contact.law == hertz and contact.restitution == 0.9",
          {"contact.restitution": (None, None, 0.5, 0.5, 0.9, 0.9),
           "contact.geometry": ("external", "internal") * 3}),
     ],

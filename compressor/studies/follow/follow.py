@@ -167,7 +167,7 @@ def objection(along: KeyRange, some: Sequence[Case]) -> str:
         return "no joint has clearance, so that nothing is to follow: set joint and clearance_mm"
     if len(some) < 2:
         one = f"--over {along.key} has one value of this machine"
-        return f"{one}: give more, or mend --only or zip"
+        return f"{one}: give more, or mend --only, exclude or zip"
     if some[0].key == some[-1].key:
         return f"--over {along.key} changes nothing in this machine: follow another key"
     return ""

@@ -106,9 +106,11 @@ def test_a_chain_goes_on_alone_from_its_last_value_and_ends_in_the_same_bits(
 
 def test_values_that_a_machine_does_not_have_are_missing(in_process, tmp_path):
     text = WORN + "machine: {rod_mass_kg: [3, 4, 5]}\nsolve: {accuracy: draft}\n"
-    path = write(tmp_path / "two.yaml", text)
-    only = "machine.rod_mass_kg < 4 or clearance_mm < 0.25 and machine.rod_mass_kg < 5"
-    words = ["--over", OVER, "--no-exponent", "--points", "6", "--quiet", "-j", "1", "--only", only]
+    path = write(
+        tmp_path / "two.yaml", text + "exclude: machine.rod_mass_kg > 3 and clearance_mm > 0.25\n"
+    )
+    words = ["--over", OVER, "--no-exponent", "--points", "6", "--quiet", "-j", "1",
+             "--only", "machine.rod_mass_kg < 5"]  # fmt: skip
     assert cli.main(["follow", path, "-r", str(tmp_path), *words]) == 0
     found = xr.load_dataset(tmp_path / "follow/two-clearance_mm.nc")
     assert found["status"].values.tolist() == [[["ok"] * 3], [["ok", "ok", "missing"]]]
@@ -153,6 +155,8 @@ def test_a_chain_reads_at_its_last_value_what_it_does_not_at_its_first(tmp_path)
         ("joint: [none, big_end]\nclearance_mm: 0.1\n", "machine.speed_rpm=300:700:3",
          "no joint has clearance, so that nothing is to follow: set joint and clearance_mm (joint "
          "none)"),
+        (WORN + "exclude: clearance_mm > 0.1\n", OVER, "case.yaml: --over clearance_mm has "
+         "one value of this machine: give more, or mend --only, exclude or zip"),
         (WORN + "load: none\nspring: {stiffness_N_per_mm: 1}\n", OVER,
          "case.yaml:4:1: spring: "),
         (WORN, "clearance_mm=0.1:11:3", "AT: clearance_mm: 11 mm exceeds the pin radius"),
