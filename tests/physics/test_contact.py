@@ -2,11 +2,9 @@
 
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
@@ -35,41 +33,6 @@ def test_rise_is_a_cubic_and_constant_outside_to_the_bit(s, h):
 def test_static_penetration(force, depth_mm):
     assert (force / K) ** (2 / 3) * 1e3 == pytest.approx(depth_mm, abs=5e-4)
     assert normal_force((force / K) ** (2 / 3), 0.0, 1.0, K, 2e-4, law())[0] == pytest.approx(force)
-
-
-def bounce(speed, p, mass=5.0):
-    """Contact time, exit speed and depth of a mass that strikes the contact at `speed`."""
-
-    def derivative(_, y):
-        return [y[1], -normal_force(y[0], y[1], 1.0, K, C, p)[0] / mass]
-
-    def leaves(_, y):
-        return y[0]
-
-    leaves.terminal, leaves.direction = True, -1
-    scale = speed * 1e-4
-    run = solve_ivp(
-        derivative, (0, 1), [1e-15, speed], "DOP853", events=leaves, rtol=1e-10,
-        atol=scale * 1e-10, dense_output=True,
-    )  # fmt: skip
-    depth = run.sol(np.linspace(0, run.t[-1], 2001))[0].max()
-    return run.t[-1], abs(run.y[1, -1]), depth
-
-
-@pytest.mark.parametrize("speed", [0.01, 0.1, 1.0])
-def test_undamped_bounce_is_hertzian(speed):
-    seconds, out, depth = bounce(speed, law(contact={"damping_N_s_per_mm": 0}))
-    deepest = (5 * 5.0 * speed**2 / (4 * K)) ** 0.4
-    assert depth == pytest.approx(deepest, rel=1e-5)
-    assert seconds == pytest.approx(2.9432 * deepest / speed, rel=1e-4)
-    assert out == pytest.approx(speed, rel=1e-8)
-
-
-@pytest.mark.parametrize(
-    ("speed", "restitution"), [(0.01, 0.90), (0.1, 0.31), (0.2, 0.16), (1, 0.03)]
-)
-def test_restitution_of_the_paper_s_contact(speed, restitution):
-    assert bounce(speed, law())[1] / speed == pytest.approx(restitution, abs=0.006)
 
 
 vectors = st.tuples(

@@ -1,7 +1,6 @@
 """One source, compiled or not: the JIT switched off gives the same numbers."""
 
 import json
-import math
 import os
 import subprocess
 import sys
@@ -11,7 +10,6 @@ import pytest
 
 from compressor import program
 from compressor.physics import _jit
-from compressor.physics._jit import square_root
 
 PROBE = """
 import json
@@ -79,18 +77,3 @@ def test_a_named_folder_that_takes_no_file_is_replaced_with_a_remark(kind, tmp_p
         found = program.machine_code_folder()
     assert found.parent == program.COMPILED / "__pycache__"
     assert program.machine_code_folder() == found  # without a remark, also in workers
-
-
-@pytest.mark.compiled
-def test_a_negative_number_has_no_square_root_either_way():
-    numba = pytest.importorskip("numba")
-    _jit.load_numba()
-
-    @numba.njit
-    def compiled(a):
-        return square_root(a)
-
-    for number in (-1.0, math.nan):
-        assert math.isnan(compiled(number))
-        assert math.isnan(square_root(number))  # from Python
-    assert compiled(2.25) == square_root(2.25) == 1.5

@@ -9,7 +9,6 @@ import pytest
 from compressor.cases.case import Case
 from compressor.physics.kinematics import (
     MAX_SERIES_ANGLE,
-    angle_at,
     exact_motion,
     ideal,
     ideal_after,
@@ -85,15 +84,3 @@ def test_rod_spin_and_its_rate_are_derivatives():
         angle = [math.atan2(m.sin_phi, m.cos_phi) for m in (early, late)]
         assert (angle[1] - angle[0]) / (2 * h) == pytest.approx(now.rate, rel=1e-6, abs=1e-6)
         assert (late.rate - early.rate) / (2 * h) == pytest.approx(now.spin_up, rel=1e-6, abs=1e-4)
-
-
-@pytest.mark.parametrize("degrees", [0, 38.886, 84.2608, 90, 179.9])
-def test_angle_at_inverts_the_motion(degrees):
-    theta = math.radians(degrees)
-    assert angle_at(exact_motion(theta, R, L, OMEGA)[0], R, L) == pytest.approx(theta, abs=1e-7)
-
-
-@pytest.mark.parametrize("x", [0.47, 0.73])
-def test_angle_outside_the_stroke_is_refused(x):
-    with pytest.raises(ValueError, match="outside the stroke"):
-        angle_at(x, R, L)

@@ -68,24 +68,6 @@ def test_ideal_force(values, degrees, phase, force):
     )
 
 
-def test_gas_is_continuous_at_exact_corners_only():
-    exact, printed = (record(Case.from_values(values)) for values in (EXACT, GAS))
-    jumps = []
-    for p in (exact, printed):
-        corner = np.degrees(p.corners[2])
-        jumps.append(abs(ideal_force(p, corner, 2) - ideal_force(p, corner, 3)))
-    assert jumps[0] < 1e-8
-    assert 10 < jumps[1] < 100
-
-
-def test_spring_follows_the_actual_motion():
-    p = record(Case())
-    rising = press(p, 1, 0.6, -1.0, 1e-4, 0.5) - press(p, 1, 0.6, -1.0)
-    assert rising == pytest.approx(20e3 * 1e-4 + 23 * 0.5)
-    moving = press(p, 0, 0.7, -1.0) - press(p, 0, 0.69, -2.0)
-    assert moving == pytest.approx(20e3 * 0.01 + 23)
-
-
 def test_segments_cover_the_run_in_order():
     p = record(Case())
     edges, phases = segments(p, 0.48)
@@ -167,19 +149,6 @@ def test_a_cylinder_is_continuous_at_its_corners():
         degrees = math.degrees(edge * p.omega)
         change = ideal_force(p, degrees, int(before)) - ideal_force(p, degrees, int(after))
         assert abs(change) < 1e-7
-
-
-def test_a_single_acting_cylinder_is_the_paper_s_gas_load():
-    """With exact corners; all forces to rounding."""
-    values = {"load": "gas", "gas": {"back_pressure_MPa": 0.05, "switching": "exact"}}
-    plain = record(Case.from_values(values))
-    values["gas"]["action"] = "single"
-    single = record(Case.from_values(values))
-    ours, theirs = segments(single, 0.5), segments(plain, 0.5)
-    assert ours[0] == pytest.approx(theirs[0], rel=1e-14)
-    assert ours[1].tolist() == theirs[1].tolist()
-    for degrees in np.linspace(1, 359, 40):
-        assert in_segments(single, degrees) == pytest.approx(in_segments(plain, degrees), rel=1e-13)
 
 
 @pytest.mark.parametrize("away", [0.0, 1e-11, -1e-11])

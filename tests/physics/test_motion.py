@@ -9,8 +9,8 @@ import reference
 
 from compressor.cases.case import Case
 from compressor.physics.observe import COLUMNS, Column
-from compressor.physics.systems import derivative, observe_at, start
-from compressor.solve.si_record import offsets, record
+from compressor.physics.systems import derivative, observe_at
+from compressor.solve.si_record import record
 
 STATES = 400
 SCENES = ("big_end", "small_end", "both")
@@ -161,34 +161,18 @@ def test_a_nanometre_of_clearance_keeps_its_digits():
     assert rates[2:] == pytest.approx([float(e) for e in expected], rel=1e-12)
 
 
-def eccentricities(p, t, y):
-    """Of both journals, a row each, and the whole row."""
-    row = np.empty(COLUMNS)
-    observe_at(t, y, 1, p, row)
-    return row[Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(2, 2), row
-
-
 @pytest.mark.parametrize("scene", SCENES)
 def test_eccentricity_matches_the_positions(scene):
     """The difference identities against plain trigonometry of the positions."""
     case = Case.from_values({"joint": scene, "clearance_mm": 0.2})
     p, rng = record(case), np.random.default_rng(4)
     for t in np.linspace(0.001, 0.11, 12):
-        found, row = eccentricities(p, t, random_state(scene, case, rng))
+        row = np.empty(COLUMNS)
+        observe_at(t, random_state(scene, case, rng), 1, p, row)
+        found = row[Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(2, 2)
         theta, phi = p.omega * t, row[Column.ROD_ANGLE]
         pin = p.crank_radius * np.array([math.cos(theta), math.sin(theta)])
         rod = p.rod_length * np.array([math.cos(phi), -math.sin(phi)])
         crosshead = np.array([row[Column.DISPLACEMENT], 0.0])
         # going round the loop: pin - e_big + rod + e_small = crosshead
         assert pin - found[0] + rod + found[1] == pytest.approx(crosshead, abs=1e-14)
-
-
-@pytest.mark.parametrize("scene", SCENES)
-def test_initial_offset_shifts_the_journal(scene):
-    shift = {"big_end_x": 0.05, "big_end_y": -0.08, "small_end_x": 0.02, "small_end_y": 0.11}
-    values = {"joint": scene, "clearance_mm": 0.2, "initial_offset_mm": shift}
-    case = Case.resolve(values)
-    p, y = record(case), np.zeros(8 if scene == "both" else 4)
-    start(offsets(case), y, p)
-    expected = offsets(case) * (p.clearance[:, None] > 0)
-    assert eccentricities(p, 0.0, y)[0] == pytest.approx(expected, abs=1e-17)

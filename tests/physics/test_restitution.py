@@ -22,14 +22,6 @@ pytestmark = pytest.mark.compiled
 
 
 @pytest.mark.parametrize(("law", "asked", "given"), EACH)
-def test_the_closed_form_gives_what_is_tabled(law, asked, given):
-    chi = HYSTERESIS[Law[law.upper()]](asked)
-    most = min(1.0, 1.0 / chi) * (1 - 1e-12)
-    out = brentq(lambda e: chi * (1 + e) - math.log((1 + chi) / (1 - chi * e)), 1e-9, most)
-    assert out == pytest.approx(given, abs=6e-5)
-
-
-@pytest.mark.parametrize(("law", "asked", "given"), EACH)
 def test_a_drop_through_the_whole_solver_gives_it_back(law, asked, given):
     run, rows = drop("small_end", 0.3, law=law, restitution=asked)
     assert given_back(rows) == pytest.approx(given, abs=1e-3)
