@@ -4,28 +4,23 @@ import math
 
 import numpy as np
 import pytest
+from cylinder_made import DOUBLE, MACHINE
 
 from compressor.analysis.cylinder import card_works, end_states, ideal_cycles
 from compressor.cases.case import Case
 from compressor.physics import static_load
 from compressor.solve import measure, record, simulate
 
-MACHINE = {"stroke_mm": 180, "rod_length_mm": 450, "speed_rpm": 740}
-DOUBLE = {
-    "action": "double", "bore_mm": 220, "rod_diameter_mm": 60, "suction_MPa": 0.2,
-    "discharge_MPa": 0.7, "exponent": 1.3, "clearance_percent": {"head": 12, "crank": 14},
-}  # fmt: skip
-LOSSES = {"valve_loss_percent": {"suction": 4, "discharge": 5}}
 SINGLE = {"action": "single", "rod_diameter_mm": None, "clearance_percent": 12}
 CYLINDERS = {
-    "double": {},
-    "losses": LOSSES,
+    "double": {"valve_loss_percent": None},
+    "losses": {},
     "single": SINGLE,
     "crank end": {"action": "crank_end", "clearance_percent": 14},
     "head unloaded": {"unloaded": "head"},
-    "crank unloaded": {"unloaded": "crank", **LOSSES},
+    "crank unloaded": {"unloaded": "crank"},
     "isothermal": {"exponent": 1},
-    "all idle": {**SINGLE, "unloaded": "head"},
+    "all idle": {**SINGLE, "unloaded": "head", "valve_loss_percent": None},
 }
 
 
@@ -75,7 +70,7 @@ def stroke_work(face, full, empty, before, case):
 def test_a_worn_machine_takes_the_work_of_the_spaces_at_its_dead_centres():
     """By the closed form of each stroke; the net force at dead centres shortens the stroke."""
     case = cylinder(
-        LOSSES, joint="both", clearance_mm=0.2,
+        {}, joint="both", clearance_mm=0.2,
         solve={"duration_rev": 3, "settle_rev": 1, "accuracy": "fine"},
     )  # fmt: skip
     run = simulate(case)
@@ -125,7 +120,7 @@ def test_the_pressures_of_a_run_are_those_that_press(tmp_path, name):
         gas = {"back_pressure_MPa": 0.1, "bore_mm": 220, "indicator": str(tmp_path / "card.csv")}
         case = Case.from_values({"load": "gas", "gas": gas, **worn})
     else:
-        case = cylinder({**CYLINDERS[name], "back_pressure_MPa": 0.1}, **worn)
+        case = cylinder(CYLINDERS[name], **worn)
     run = simulate(case)
     found = end_states(run)
     head = math.pi * (case.gas.piston_radius_mm / 1e3) ** 2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from compressor.analysis import NoSeriesError, frame_forces, healthy_twin, paper_cases, shaking
+from compressor.analysis import NoSeriesError, frame_forces, healthy_twin, shaking
 from compressor.analysis.shaking import whole_revolutions
 from compressor.cases.case import Case
 from compressor.solve import SIGNALS, simulate
@@ -73,9 +73,9 @@ def test_the_healthy_twin_has_nothing_that_only_a_clearance_can_have(more):
     ("name", "above"),
     [("big_end 0.1", 475), ("big_end 0.3", 1025), ("small_end 0.1", 639), ("small_end 0.3", 555)],
 )
-def test_force_above_order_12_of_the_paper_s_cases(name, above):
+def test_force_above_order_12_of_the_paper_s_cases(name, above, paper_runs):
     """Once measured apart from this code, by numpy's Fourier transform of 3 revolutions."""
-    run = simulate(paper_cases()[name])
+    run = paper_runs[name]
     assert shaking(run).above == pytest.approx(above, rel=0.02)
     kept = slice(1200, 4800)
     force = frame_forces(run)["shaking_force"][kept, 0]

@@ -183,10 +183,7 @@ def test_bars_of_the_ideal_machine_cover_its_quadrature(load):
 
 @pytest.mark.compiled
 def test_error_bars_hold_with_laws():
-    """Of the default promise, by far tighter runs. With six restitutions each, 95 % of 500 do.
-
-    One of the twelve may say that it is chaotic: its runs at 2.5e-12 and 1e-12 differ by 1 %.
-    """
+    """Of the default promise, by far tighter runs. With six restitutions each, 95 % of 500 do."""
     shares, chaotic = [], 0
     laws = "gonthier", "flores", "lankarani_nikravesh", "hu_guo"
     for law, restitution in itertools.product(laws, (0.3, 0.5, 0.6)):

@@ -10,6 +10,7 @@ from compressor.cases.case import Case
 from compressor.metrics import METRICS
 from compressor.solve import error_bars
 from compressor.solve import run as run_module
+from compressor.solve.request import revolutions
 from compressor.solve.search import MEASURED_REV, agree, steady
 from compressor.solve.simulate import measure
 
@@ -133,3 +134,20 @@ def test_a_period_of_more_than_one_revolution_is_settled_too():
     assert steady(turns(9, 1, 2, 1, 2), 0.01) == (1, 2)
     assert steady(turns(1, 2, 3, 1, 2, 3), 0.01) == (0, 3)
     assert steady(turns(1, 2, 3, 4, 5, 6, 7, 8), 0.01) is None
+
+
+@pytest.mark.parametrize("method", ["auto", "DOP853"])
+def test_revolutions_add_up_to_the_whole_run(method):
+    of = case(duration_rev=2.2, settle_rev=0.1, method=method, error_bars=False)
+    rtol = 1e-7 if method == "DOP853" else 1e-9  # which steps in Python
+    whole, parted = (
+        run_module.run_at_tolerance(of, rtol, 60.0, False, cuts=cuts)
+        for cuts in ((), revolutions(of.settle, of.duration, of.turn))
+    )
+    seconds = [turn["seconds"] for turn in parted.trajectory.turns]
+    assert seconds == pytest.approx([of.turn] * 2, rel=1e-9)
+    for name in METRICS:
+        np.testing.assert_allclose(parted.metrics[name], whole.metrics[name], rtol=1e-4, atol=1e-9)
+    for name in ("seconds", "crank_work", "contact_work", "energy", "peak_kinetic"):
+        one, other = (run.trajectory.tally[name] for run in (parted, whole))
+        assert one == pytest.approx(other, rel=1e-5), name

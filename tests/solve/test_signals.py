@@ -20,18 +20,6 @@ def run(**values):
     return simulate(Case.from_values({**SIGNALLED, **values}))
 
 
-def test_a_mirrored_machine_shakes_the_same_way():
-    """Forces by sign: what the bearing and the guide take is all that is vertical."""
-    found = run(joint="both", clearance_mm=0.2, machine={"gravity_m_per_s2": 9.81}, solve=TURN)
-    up = found["bearing_force"].sel(axis="y") + found["guide_force"]
-    np.testing.assert_allclose(found["shaking_force"].sel(axis="y"), up, rtol=1e-12, atol=1e-9)
-    along = found["bearing_force"].sel(axis="x") + found["piston_force"]
-    np.testing.assert_allclose(found["shaking_force"].sel(axis="x"), along, rtol=1e-12, atol=1e-9)
-    np.testing.assert_array_equal(
-        found["rod_load"], found["contact_force"].sel(joint="small_end", axis="x")
-    )
-
-
 @pytest.mark.parametrize(
     ("asked", "series", "when", "is_same"),
     [(SIGNALLED, SIGNALS, "signals", True), ({"body": True}, BODY_SERIES, "body", False)],

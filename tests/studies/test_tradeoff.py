@@ -81,14 +81,6 @@ def test_each_contact_law_may_stand_in_place_of_each_other(law, other):
         assert two.contact.stiffness_N_per_mm15 == 5e5
 
 
-def test_the_other_models_of_a_plain_case():
-    names = {one.name for one in variants.other_models(case())}
-    laws = {f"contact law: {law}" for law in CONTACT_LAWS if law != "impact"}
-    ends = {f"contact {of} {how} 2" for of in ("stiffness", "damping") for how in "÷×"}
-    rest = {"friction law: lugre", "play of the guide", "oil film", "elastic rod"}
-    assert laws | ends | rest <= names
-
-
 # ---- numbers in doubt ---------------------------------------------------------------------------
 
 PLANT = """
