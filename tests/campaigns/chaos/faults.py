@@ -86,7 +86,8 @@ def trial(place, draw, number, counts):
         words = [one for word in words for one in known.get(word, [word])]
         used = os.statvfs(disk)
         pages, files = used.f_blocks - used.f_bfree, used.f_files - used.f_ffree
-        options = {"ro": "ro", "pages": f"size={(pages + more) * used.f_frsize}",
+        room = max(pages + more, 1) * used.f_frsize  # 0 would be without a limit
+        options = {"ro": "ro", "pages": f"size={room}",
                    "files": f"size=64m,nr_inodes={files + more}"}  # fmt: skip
         common.call("mount", "-o", f"remount,{options[kind]}", disk)
         said, problem = say(words), ""
