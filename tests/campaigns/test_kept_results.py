@@ -1,5 +1,6 @@
 """What campaigns have measured is of today's cases, and reaches what is required of it."""
 
+import ast
 import math
 from collections import Counter
 
@@ -7,6 +8,7 @@ import measure_accuracy
 import measure_identify
 import measure_peers
 import mutation
+import planted_bugs
 import pytest
 from page_tables import FINDINGS, kept
 from peers import mechanism
@@ -107,3 +109,11 @@ def test_mutants_are_caught():
     assert not any("cannot_be_loaded" in row for row in rows)
     assert not any(row["caught_by"] for row in rows if "equivalent" in row)
     assert all("::" in row["caught_by"] for row in rows if row["caught_by"])
+
+
+def test_thirty_bugs_can_be_planted():
+    """Their texts still stand in the sources; says which does not."""
+    bugs = planted_bugs.bugs()
+    assert len({bug.identity for bug in bugs}) == 30
+    for bug in bugs:
+        ast.parse(bug.source())
