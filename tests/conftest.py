@@ -122,6 +122,21 @@ def read(tmp_path, monkeypatch):
     return read
 
 
+SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
+
+
+@pytest.fixture
+def studies(tmp_path):
+    """Makes the studies of short jobs from values by name, lists being swept (JSON is YAML)."""
+
+    def make(**values):
+        short = {name: {**content, "solve": SHORT | content.get("solve", {})}
+                 for name, content in values.items()}  # fmt: skip
+        return load_studies(*write_cases(tmp_path, **short))
+
+    return make
+
+
 @pytest.fixture
 def compsim(capsys):
     """Run a command, which ends with `code`, and return what it printed: `out` and `err`."""

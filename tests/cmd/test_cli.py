@@ -14,15 +14,13 @@ from pathlib import Path
 import pytest
 from chaos.processes import members
 from compsim import screen
-from conftest import wait_for
+from conftest import SHORT, wait_for
 
 from compressor.cases import load
 from compressor.cases.load import load_cases
 from compressor.program import duration
 from compressor.store import reader as store
 from compressor.store.studies import read_studies
-
-SOLVE = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 
 
 @pytest.fixture
@@ -31,7 +29,7 @@ def case_file(tmp_path, monkeypatch, in_process):
     monkeypatch.chdir(tmp_path)
 
     def write(name, **values):
-        values["solve"] = SOLVE | values.get("solve", {})
+        values["solve"] = SHORT | values.get("solve", {})
         Path(name).write_text(json.dumps(values))
         return name
 
@@ -249,7 +247,7 @@ def test_a_run_that_is_told_to_end(tmp_path):
     """A real one, in its own process group, with at least one job done."""
     rods = [4 + number / 1000 for number in range(JOBS)]
     values = {"joint": "both", "clearance_mm": 0.1, "machine": {"rod_mass_kg": rods}}
-    solve = SOLVE | {"method": "DOP853"}
+    solve = SHORT | {"method": "DOP853"}
     (tmp_path / "many.yaml").write_text(json.dumps(values | {"solve": solve}))
     run = subprocess.Popen(
         [sys.executable, "-m", "compsim", "run", "many.yaml", "-j", "1"],

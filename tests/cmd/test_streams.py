@@ -95,7 +95,7 @@ def test_ctrl_c_amid_an_import_leaves_no_traceback(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems refuse such names")
-def test_a_folder_whose_name_is_no_utf_8_holds_results(tmp_path):
+def test_a_folder_whose_name_is_no_utf_8_holds_results(tmp_path, in_process):
     (tmp_path / "healthy.yaml").write_text(
         "solve: {duration_rev: 0.1, settle_rev: 0, accuracy: draft, output_step_deg: 1}\n"
     )

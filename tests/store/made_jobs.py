@@ -4,7 +4,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from conftest import keep, write_cases
+from conftest import SHORT, keep, write_cases
 
 from compressor.cases.load import load_studies
 from compressor.cases.study import Axis
@@ -13,8 +13,6 @@ from compressor.solve.simulate import simulate
 from compressor.store.batch import read_lines, read_tables
 from compressor.store.reader import read_store
 from compressor.store.studies import StoredStudy, encode, write_study
-
-SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 
 
 def study(name, solve=SHORT, **values):

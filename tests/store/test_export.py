@@ -7,7 +7,7 @@ import made_jobs
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import flip
+from conftest import SHORT, flip
 
 from compressor.metrics import METRICS, SIZES
 from compressor.store.export import export
@@ -18,7 +18,7 @@ from compressor.store.reader import open_study, read_job, read_store
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     """A grid of four jobs, of which two failed, one is ok and one is missing; two sampled jobs."""
-    steps = made_jobs.SHORT | {"max_steps": [5, 10**6]}
+    steps = SHORT | {"max_steps": [5, 10**6]}
     grid = made_jobs.study("grid", steps, joint="both", clearance_mm=[0.1, 0.2])
     listed = made_jobs.study(
         "list", joint="big_end", clearance_mm=0.1, sample={"n": 2},

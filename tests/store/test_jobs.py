@@ -6,8 +6,8 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import WORN_SENSOR, assert_same_bits, keep
-from made_jobs import SHORT, batches, held, key, made
+from conftest import SHORT, WORN_SENSOR, assert_same_bits, keep
+from made_jobs import batches, held, key, made
 
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate

@@ -4,8 +4,8 @@ import json
 import shlex
 
 import pytest
-from conftest import write_cases
-from made_jobs import SHORT, fill, study
+from conftest import SHORT, write_cases
+from made_jobs import fill, study
 
 from compressor.metrics import NUMBERS, QUANTILES
 from compressor.outcome import REGIME_WORDS, Regime

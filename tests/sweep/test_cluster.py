@@ -1,11 +1,9 @@
 """A dask cluster does as one machine does, whatever becomes of its workers."""
 
-import contextlib
 import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import bad_jobs
 import distributed
@@ -25,28 +23,15 @@ from compressor.sweep.sweep import Options, sweep
 
 
 @pytest.fixture(scope="module")
-def clusters():
-    """The clusters that were made for this module, with our path."""
-    made = []
+def dask():
+    """Two worker processes with our path."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
-        yield made
-    for one in made:
-        one.close()
-
-
-@pytest.fixture
-def dask(clusters):
-    """Two worker processes, new ones where dask has not replaced one that a test has killed."""
-    with contextlib.suppress(TimeoutError, IndexError):
-        clusters[-1].wait_for_workers(2, timeout=15)
-        return clusters[-1]
-    made = distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
-    )
-    clusters.append(made)
-    made.wait_for_workers(2, timeout=60)
-    return made
+        with distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
+        ) as made:
+            made.wait_for_workers(2, timeout=60)
+            yield made
 
 
 @pytest.fixture(scope="module")
@@ -66,43 +51,6 @@ def locally(studies, tmp_path_factory):
     folder = tmp_path_factory.mktemp("local")
     sweep(studies, folder, 1)
     return contents(folder)
-
-
-def assert_same(folder, expected, but=""):
-    """A store holds the same jobs and bits, timings and one job apart, and no more files."""
-    assert differing(contents(folder), expected) == but
-    assert verify(folder) == []
-    assert not list(Path(folder).glob("**/.*"))
-
-
-def test_a_worker_that_is_killed_costs_nothing(dask, studies, locally, tmp_path):
-    victim = dask.workers[0].process.pid
-    with connect_cluster(dask.scheduler_address) as backend:
-
-        def killing(*arguments):
-            for number, end in enumerate(backend(*arguments)):
-                if number == 7:
-                    os.kill(victim, signal.SIGKILL)
-                yield end
-
-        summary = sweep(studies, tmp_path / "out", options=Options(backend=killing))
-    assert (summary.run_now, summary.failed) == (70, ())
-    assert_same(tmp_path / "out", locally)
-    with pytest.raises(ProcessLookupError):
-        os.kill(victim, 0)
-
-
-def test_a_job_that_fells_its_workers_is_lost_alone(dask, studies, locally, tmp_path, monkeypatch):
-    monkeypatch.setattr(dask.scheduler, "allowed_failures", 0)
-    monkeypatch.setattr(cluster, "run_job", bad_jobs.harmful)
-    monkeypatch.setattr(cluster, "run_cases", bad_jobs.run_harmful_cases)
-    with connect_cluster(dask.scheduler_address) as backend:
-        summary = sweep(studies, tmp_path / "out", options=Options(backend=backend))
-    (lost,) = summary.failed
-    assert lost.coordinates["clearance_mm"] == pytest.approx(0.2017, abs=0.001)
-    assert lost.reason == "worker_died"
-    assert lost.detail == "it felled 1 workers of the cluster that had it alone"
-    assert_same(tmp_path / "out", locally, but=lost.key)
 
 
 def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_path, monkeypatch):
@@ -168,3 +116,31 @@ def test_sigterm_keeps_what_is_finished_and_cancels_the_rest(dask, tmp_path):
     assert 0 < len(store.read_store(out).keys()) < 5000
     assert not list(out.glob("batches/.*"))
     wait_for(lambda: not dask.scheduler.tasks)
+
+
+def test_a_worker_that_is_killed_costs_nothing_and_a_job_that_fells_its_own_is_lost_alone(
+    dask, studies, locally, tmp_path, monkeypatch
+):
+    """The last test, since it costs the workers."""
+    monkeypatch.setattr(dask.scheduler, "allowed_failures", 0)
+    monkeypatch.setattr(cluster, "run_job", bad_jobs.harmful)
+    monkeypatch.setattr(cluster, "run_cases", bad_jobs.run_harmful_cases)
+    victim = dask.workers[0].process.pid
+    with connect_cluster(dask.scheduler_address) as backend:
+
+        def killing(*arguments):
+            for number, end in enumerate(backend(*arguments)):
+                if number == 0:  # before a job fells one
+                    os.kill(victim, signal.SIGKILL)
+                yield end
+
+        summary = sweep(studies, tmp_path / "out", options=Options(backend=killing))
+    assert summary.run_now == 70
+    (lost,) = summary.failed
+    assert lost.coordinates["clearance_mm"] == pytest.approx(0.2017, abs=0.001)
+    assert lost.reason == "worker_died"
+    assert lost.detail == "it felled 1 workers of the cluster that had it alone"
+    found = tmp_path / "out"
+    assert differing(contents(found), locally) == lost.key  # to the bit, timings apart
+    assert verify(found) == []
+    assert not list(found.glob("**/.*"))

@@ -1,31 +1,12 @@
 """What is ahead of a sweep: counts at once, and costs from some of its jobs."""
 
-from pathlib import Path
-
 import pytest
-from conftest import write_cases
 
-from compressor.cases.load import load_studies
 from compressor.sweep import plan
 from compressor.sweep.plan import START_SECONDS, add_times, forecast
 from compressor.sweep.warm_up import Part
 
-SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
-NINE = {"machine": {"rod_mass_kg": {"linspace": [3, 5, 9]}}}
-
-
-@pytest.fixture
-def studies(tmp_path, monkeypatch):
-    """Makes the studies of some values by name, in the present folder (JSON is YAML)."""
-    monkeypatch.chdir(tmp_path)
-
-    def make(**values):
-        whole = {name: {"output": {"keep": "metrics"}, **content,
-                        "solve": SHORT | content.get("solve", {})}
-                 for name, content in values.items()}  # fmt: skip
-        return load_studies(*write_cases(Path(), **whole))
-
-    return make
+NINE = {"machine": {"rod_mass_kg": {"linspace": [3, 5, 9]}}, "output": {"keep": "metrics"}}
 
 
 def timed_as(monkeypatch, seconds, size=0):
@@ -43,8 +24,8 @@ def timed_as(monkeypatch, seconds, size=0):
 
 
 def timed(studies, workers, remark=str):
-    """What is ahead of studies in an empty folder, with its time."""
-    return add_times(*forecast(studies, "results", 0), workers, remark)
+    """What is ahead of studies of which nothing is stored, with its time."""
+    return add_times(*forecast(studies, "none/yet", 0), workers, remark)
 
 
 def test_one_job_of_each_study_tells_the_time_of_all(studies, monkeypatch):

@@ -9,10 +9,9 @@ import bad_jobs
 import h5py
 import numpy as np
 import pytest
-from conftest import flip, write_cases
+from conftest import flip
 
 from compressor.cases.case import Case
-from compressor.cases.load import load_studies
 from compressor.store import netcdf
 from compressor.store import reader as store
 from compressor.store.files import StoreError
@@ -23,21 +22,8 @@ from compressor.sweep.worker import attempt
 
 SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 
-SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 BOTH = {"joint": "both", "clearance_mm": 0.1}
 LATE = {**BOTH, "solve": {"method": "DOP853", "timeout_s": 1e-9}}  # out of time at its first step
-
-
-@pytest.fixture
-def studies(tmp_path):
-    """Makes the studies of some values by name, lists being swept (JSON is YAML)."""
-
-    def make(**values):
-        short = {name: {**content, "solve": SHORT | content.get("solve", {})}
-                 for name, content in values.items()}  # fmt: skip
-        return load_studies(*write_cases(tmp_path, **short))
-
-    return make
 
 
 def statuses(folder, study):
@@ -206,24 +192,24 @@ def test_a_store_that_cannot_be_read_runs_nothing(studies, tmp_path):
         sweep(studies(one={}), tmp_path / "out", 1, lambda *event: pytest.fail("began to run"))
 
 
-def test_an_interrupted_sweep_keeps_its_jobs_and_goes_on(studies, tmp_path):
+def test_an_interrupted_sweep_keeps_its_jobs_and_goes_on(studies, tmp_path, in_process):
     def stop(done, total, remark):
         if done:
             raise KeyboardInterrupt
 
-    made = studies(one={**BOTH, "machine": {"rod_mass_kg": {"linspace": [4, 7, 30]}}})
+    made = studies(one={**BOTH, "machine": {"rod_mass_kg": {"linspace": [4, 7, 9]}}})
     with pytest.raises(KeyboardInterrupt):
         sweep(made, tmp_path / "out", 1, stop)
     keys = store.read_store(tmp_path / "out").keys()
     before = {key: store.read_job(tmp_path / "out", key).seconds.item() for key in keys}
-    assert 0 < len(before) < 30
+    assert 0 < len(before) < 9
     summary = sweep(made, tmp_path / "out", 1)
-    assert (summary.done_before, summary.run_now) == (len(before), 30 - len(before))
+    assert (summary.done_before, summary.run_now) == (len(before), 9 - len(before))
     for key, seconds in before.items():  # none has run again
         assert store.read_job(tmp_path / "out", key).seconds.item() == seconds
 
 
-def test_a_relative_folder_is_the_one_of_the_start(studies, tmp_path, monkeypatch):
+def test_a_relative_folder_is_the_one_of_the_start(studies, tmp_path, monkeypatch, in_process):
     made = studies(one={})
     monkeypatch.chdir(tmp_path)
     sweep(made, "out", 1, lambda *event: os.chdir("/"))
