@@ -125,13 +125,12 @@ def damages(data, rng):
         yield data[:size]
 
 
-@pytest.mark.parametrize("samples", [0, 30])
-def test_every_flipped_bit_of_a_batch_is_told_or_changes_nothing(samples, tmp_path):
-    jobs = [made(n, samples=samples, detail="µ") for n in range(3)]
+def test_every_flipped_bit_of_a_batch_is_told_or_changes_nothing(tmp_path):
+    jobs = [made(n, samples=15 * n, detail="µ") for n in range(3)]  # one without series
     path = write_batch(tmp_path, jobs)
     plan(tmp_path, 3)
     good, whole, told = path.read_bytes(), held(read_store(tmp_path)), 0
-    for data in damages(good, random.Random(samples)):
+    for data in damages(good, random.Random(30)):
         path.write_bytes(data)
         try:
             stored = read_store(tmp_path)
@@ -141,9 +140,10 @@ def test_every_flipped_bit_of_a_batch_is_told_or_changes_nothing(samples, tmp_pa
         assert found in (None, whole)
         if found is None:
             told += 1
-            (damage,) = verify(tmp_path)
-            assert (damage.path, [*damage.studies]) == (path, [key(0), key(1), key(2)])
-            assert {*damage.studies[key(1)]} == {"made"}
+            if told % 4 == 0:
+                (damage,) = verify(tmp_path)
+                assert (damage.path, [*damage.studies]) == (path, [key(0), key(1), key(2)])
+                assert {*damage.studies[key(1)]} == {"made"}
     assert told > 400
     path.write_bytes(good)
     assert verify(tmp_path) == []
@@ -174,15 +174,17 @@ def test_damage_to_a_machine_that_was_followed_is_told(tmp_path, compsim):
     whole = read_dataset(path)
     assert whole.identical(kept)
     assert verify(tmp_path) == []
-    good = path.read_bytes()
+    good, told = path.read_bytes(), 0
     for data in damages(good, random.Random(2)):
         path.write_bytes(data)
         try:
             assert read_dataset(path).identical(whole)
         except DamagedFile:
-            (damage,) = verify(tmp_path)
-            assert damage.path == path
-            assert "delete it" in damage.remedy
+            told += 1
+            if told % 4 == 0:
+                (damage,) = verify(tmp_path)
+                assert damage.path == path
+                assert "delete it" in damage.remedy
     assert "delete it" in compsim("verify", "-r", tmp_path, code=5).out
 
 
