@@ -179,16 +179,6 @@ def test_enlarged_views_are_marked_and_hold_their_curves(drawn, number):
             assert y[inside].max() < high
 
 
-@pytest.mark.parametrize("number", RESPONSES)
-def test_acceleration_is_enlarged_where_it_differs_most(drawn, number):
-    _, enlarged = views(drawn, number)[-1]
-    spread = np.ptp([y for _, y in lines(enlarged)], axis=0)
-    angle = lines(enlarged)[0][0]
-    left, right = enlarged.x.range
-    inside = (angle >= left) & (angle <= right)
-    assert spread[inside].max() >= 0.98 * spread.max()
-
-
 # ---- how they look ----------------------------------------------------------------------------
 
 
@@ -205,7 +195,7 @@ def test_axes_name_their_units(drawn, number):
         assert has_label or number in (10, 13)  # these share their axis
 
 
-@pytest.mark.parametrize("number", FIGURE)
+@pytest.mark.parametrize("number", [3, 4, 6, 7, 10, 14, 15])  # one of each arrangement
 def test_legends_cover_no_panel_and_nothing_warns(drawn, number, caplog):
     with matplotlib.rc_context(pictures.STYLE):
         figure = pictures.paint(drawn[number])
@@ -213,7 +203,7 @@ def test_legends_cover_no_panel_and_nothing_warns(drawn, number, caplog):
     assert not caplog.records
     legends = [*figure.legends, *(p.get_legend() for p in figure.axes if p.get_legend())]
     several = any(len(panel.lines) > 1 for panel in figure.axes)
-    assert legends or not several or number in (3, 10, 13)
+    assert legends or not several or number in (3, 10)
     for legend in legends:
         box = legend.get_window_extent()
         assert not any(box.overlaps(panel.get_window_extent()) for panel in figure.axes)

@@ -20,11 +20,11 @@ from compressor.analysis.runs import CLEARANCES, FAULTS, case_of, label
 from compressor.cases import Case, load_cases, load_studies
 from compressor.program import CompsimWarning
 from compressor.reasons import Reason
-from compressor.report import interactive, write_report
+from compressor.report import write_report
 from compressor.report.figures import FIGURES, pictures
 from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.table import spell
-from compressor.report.interactive import draw_job, job_scripts, script, series_name
+from compressor.report.interactive import draw_job
 from compressor.report.paper_sections import comparable, find_runs
 from compressor.store import StoreWarning, read_job, read_store, read_studies, study_caveats
 from compressor.store.studies import encode, write_study
@@ -227,35 +227,27 @@ def test_every_claim_has_a_verdict(full):
 # ---- what is missing --------------------------------------------------------------------------
 
 
-def test_missing_cases_are_rows_with_what_gives_them(paper_store, tmp_path, compsim):
+def test_missing_failed_and_damaged_cases_are_rows_with_what_gives_them(
+    paper_store, tmp_path, compsim
+):
     part = part_of(paper_store, tmp_path / "part", "design", "typical", "big-end")
-    first, gone, last = next(s for s in read_studies(part) if s.name == "big-end").keys
+    keys = {study.name: study.keys for study in read_studies(part)}
+    damaged, gone, last = keys["big-end"]
     replace_jobs(part, without=[gone])
-    write_report(part, tmp_path / "out")
-    scripts = {path.name for path in (tmp_path / "out").glob("job-*.js")}
-    assert scripts == {f"job-{key}.js" for key in (first, last)}
-    figures = FIGURES["paper"].items()
-    drawn = {name for name, one in figures if {*one.needs} <= {"design", "typical"}}
-    assert {p.stem for p in (tmp_path / "out").glob("figure-*.png")} == drawn
-    found = read(tmp_path / "out")
+    fail(part, keys["design"][0], "non_finite", EVIL)
+    path = damage_series(part, damaged)
+    with pytest.warns(StoreWarning, match=f"{path.name}: is damaged"):
+        found = written(part, tmp_path)
+    assert [one.name for one in (tmp_path / "out").glob("job-*.js")] == [f"job-{last}.js"]
+    assert [one.name for one in (tmp_path / "out").glob("figure-*.png")] == ["figure-03.png"]
     assert "compsim init paper writes a file of all cases" in found.text
     compsim("init", "paper", "-o", tmp_path / "paper.yaml")
     given = {case.physics_key for case in load_cases(tmp_path / "paper.yaml")}
     assert given == {case.physics_key for case in paper_cases().values()}
     rows = {cells[0]: kind for kind, cells in found.rows}
     assert rows["big end, 0.2 mm"] == "missing"
-    assert rows["big end, 0.1 mm"] is None
-
-
-def test_failed_and_damaged_cases_are_told(paper_store, tmp_path):
-    part = part_of(paper_store, tmp_path / "part", "design", "typical", "big-end")
-    keys = {study.name: study.keys for study in read_studies(part)}
-    fail(part, keys["design"][0], "non_finite", EVIL)
-    path = damage_series(part, keys["big-end"][0])
-    with pytest.warns(StoreWarning, match=f"{path.name}: is damaged"):
-        found = written(part, tmp_path)
+    assert rows["big end, 0.3 mm"] is None
     assert ("failed", "failed: non_finite") in [(k, c[1]) for k, c in found.rows if len(c) > 1]
-    assert [p.name for p in (tmp_path / "out").glob("figure-*.png")] == ["figure-03.png"]
 
 
 def test_the_paper_s_cases_say_how_far_their_numbers_are_settled(full, paper_store):
@@ -392,7 +384,7 @@ def test_studies_are_chosen_and_trials_come_last(own, tmp_path, compsim):
 
 def test_a_study_among_the_paper_s_cases_keeps_its_section_and_notes(paper_store, tmp_path):
     """It was told by the paper's figures alone; so was one of two of the three clearances."""
-    part = part_of(paper_store, tmp_path / "part", "design", "typical", "big-end")
+    part = part_of(paper_store, tmp_path / "part", "big-end")
     whole = next(one for one in read_studies(paper_store) if one.name == "big-end")
     two = replace(whole, name="two", keys=whole.keys[:2],
                   axes=(replace(whole.axes[0], values=whole.axes[0].values[:2]),))  # fmt: skip
@@ -508,17 +500,6 @@ def test_the_last_revolution_is_shown(paper_runs):
     size = np.hypot(*run["contact_force"].sel(joint="small_end").values[LAST].T) / 1e3
     assert force.traces[1].name == "small end"
     assert force.traces[1].y == pytest.approx(size)
-
-
-def test_only_jobs_that_kept_their_series_have_scripts(paper_store, monkeypatch):
-    stored = read_store(paper_store)
-    keys = [key for study in read_studies(paper_store) for key in study.keys]
-    found = dict(job_scripts(stored, ["0" * 20, *keys]))
-    assert {*found} == {*keys}
-    assert all(text.startswith(f'compsimFigure("job-{key}"') for key, text in found.items())
-    assert found[keys[0]] == script(series_name(keys[0]), draw_job(stored.job(keys[0])))
-    monkeypatch.setattr(interactive, "MAX_SERIES", 2)
-    assert [key for key, _ in job_scripts(stored, keys)] == keys[:2]
 
 
 # ---- the paper's figures of a machine of one's own
