@@ -101,17 +101,17 @@ def revolutions(run: "xr.Dataset") -> "Iterator[xr.Dataset]":
         yield settled.isel(time=inside)
 
 
-def by_revolution(run: "xr.Dataset", value: "Callable[[xr.Dataset], float]") -> float:
-    """Return half of the 95 % interval of a value's mean over revolutions; inf of too few."""
-    return mean_bar(np.array([value(turn) for turn in revolutions(run)]))
-
-
 def measure(
     run: "xr.Dataset", value: "Callable[[xr.Dataset], float]", error: float
 ) -> BarredNumber:
-    """Return a value of a run's settled part with an error; of a chaotic run by its revolutions."""
+    """Return a value of a run's settled part with an error.
+
+    Of a chaotic run half of the 95 % interval of its revolutions' mean, inf of too few.
+    """
     settled = settled_part(run)
-    return BarredNumber(value(settled), by_revolution(settled, value) if is_chaotic(run) else error)
+    if is_chaotic(run):
+        error = mean_bar(np.array([value(turn) for turn in revolutions(settled)]))
+    return BarredNumber(value(settled), error)
 
 
 def peak(run: "xr.Dataset", name: str, **where: str) -> BarredNumber:

@@ -365,7 +365,7 @@ def draw_wear(machines: Iterable[WornMachine], title: str = "") -> report.Plotly
         last = max(last, float(at[-1]))
     for limit in {1e3 * one.worn.limit for one in drawn if math.isfinite(one.worn.limit)}:
         opening.rule(report.style.LineStyle(report.style.BLACK, linewidth=0.8), y=limit)
-        opening.write("limit", 0.02 * last, limit, shift=(0, 2), size=8.5)
+        opening.write("limit", 0.02 * last, limit, shift=(0, 2))
     opening.x.title = force.x.title = "operating hours"
     opening.span("x", 0.0, last)
     opening.y.title = "clearance (mm)"

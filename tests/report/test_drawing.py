@@ -109,7 +109,7 @@ def test_axes_read_in_the_unit_that_is_wanted():
     panel.plot([0.0, 90.0], [9.80665, -19.6133], RED, "a", errors=np.full((2, 2), 9.80665))
     panel.span("y", -29.41995, 29.41995)
     panel.rule(RED, y=9.80665)
-    panel.write("inside", 45.0, 0.5, inside="y")
+    panel.write("here", 45.0, 9.80665)
     image.map(np.arange(2.0), np.arange(1.0), np.array([[1.0, 4.0]]), palette("cividis"),
               (1.0, 4.0), "force ({})", "N")  # fmt: skip
     figure = drawing.figure()
@@ -121,7 +121,7 @@ def test_axes_read_in_the_unit_that_is_wanted():
     assert curve.error_y.array == pytest.approx([1.0, 1.0])
     assert figure.layout.yaxis.range == pytest.approx((-3.0, 3.0))
     assert figure.layout.shapes[0].y0 == pytest.approx(1.0)
-    assert (figure.layout.annotations[0].x, figure.layout.annotations[0].y) == (45.0, 0.5)
+    assert (figure.layout.annotations[0].x, figure.layout.annotations[0].y) == (45.0, 1.0)
     assert (cells.z.tolist(), cells.colorbar.title.text) == ([[1e-3, 4e-3]], "force (kN)")
 
 

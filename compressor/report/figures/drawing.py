@@ -83,7 +83,11 @@ class Panel:
             if note.name == "title":
                 note.text = text
                 return
-        self.write(text, 0.0, 1.0, inside="xy", shift=(0.0, 3.0), size=10.0, name="title")
+        self.figure.add_annotation(
+            text=text, name="title", x=0.0, xref=f"x{self.suffix} domain", xanchor="left", y=1.0,
+            yref=f"y{self.suffix} domain", yanchor="bottom", yshift=3.0 * PIXEL, showarrow=False,
+            align="left", font={"color": BLACK, "size": 10.0 * PIXEL},
+        )  # fmt: skip
 
     def label(self, way: Way, title: str, unit: str = "") -> None:
         """Name an axis before anything is drawn; `{}` in the title stands for the unit."""
@@ -124,7 +128,7 @@ class Panel:
         self.add(made, style.zorder, jobs, name * listed)
 
     def fill(self, x: ArrayLike, y: ArrayLike, style: LineStyle, name: str = "") -> None:
-        """Draw an area by its outlines, with nan between two of them."""
+        """Draw an area by its outline."""
         made = go.Scatter(
             x=self.at("x", x), y=self.at("y", y), name=name, opacity=style.alpha, mode="none",
             fill="toself", fillcolor=style.color,
@@ -187,24 +191,18 @@ class Panel:
         self.add(made, 1.0, jobs)
 
     def write(
-        self, text: str, x: float, y: float, color: str = BLACK, inside: str = "",
+        self, text: str, x: float, y: float, color: str = BLACK,
         shift: tuple[float, float] = (0.0, 0.0), side: str = "left", level: str = "bottom",
-        size: float = 9.5, name: str = "",
     ) -> None:  # fmt: skip
-        """Write a text at x and y, shares of the panel along the axes in `inside`, such as "xy".
-
-        shift: in points; side, level: of the text at its place; size: of its letters, in points.
-        """
+        """Write a text at x and y; shift: in points; side, level: of the text at its place."""
         place: dict[str, Any] = {}
         for way, at in zip(WAYS, (x, y), strict=True):
-            place[f"{way}ref"] = f"{way}{self.suffix}" + " domain" * (way in inside)
-            at = at if way in inside else float(self.at(way, at)[0])
-            is_log = self.axis(way).type == "log" and way not in inside
-            place[way] = math.log10(at) if is_log else at  # so plotly wants it
+            place[f"{way}ref"], at = f"{way}{self.suffix}", float(self.at(way, at)[0])
+            place[way] = math.log10(at) if self.axis(way).type == "log" else at  # plotly's way
         self.figure.add_annotation(
-            text=text.replace("\n", "<br>"), **place, showarrow=False, xanchor=side, yanchor=level,
-            xshift=PIXEL * shift[0], yshift=PIXEL * shift[1], align="left", name=name,
-            font={"color": color, "size": PIXEL * size},
+            text=text, **place, showarrow=False, xanchor=side, yanchor=level, align="left",
+            xshift=PIXEL * shift[0], yshift=PIXEL * shift[1],
+            font={"color": color, "size": PIXEL * 8.5},
         )  # fmt: skip
 
     def rule(self, style: LineStyle, x: float = math.nan, y: float = math.nan) -> None:

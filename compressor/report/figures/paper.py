@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from compressor import analysis
 from compressor.report.figures import curves, style
-from compressor.report.figures.drawing import WAYS, Drawing, Panel, circle, make_grid
+from compressor.report.figures.drawing import WAYS, Drawing, Panel, make_grid
 from compressor.report.figures.table import DrawnFigure, figure, spell
 from compressor.units import Units
 
@@ -318,7 +318,6 @@ def draw_contour(panel: Panel, cam: analysis.Cam, angles: np.ndarray) -> None:
     panel.scale_alike()
     panel.label("x", "x ({})", "mm")
     panel.label("y", "y ({})", "mm")
-    panel.fill(*circle(cam.base_radius * 1e3), style.fill("#f1f1f1"))
     rim = cam.base_radius * 1e3 * np.array([np.cos(angles), np.sin(angles)])
     panel.plot(rim[0], rim[1], BASE, f"base circle, {cam.base_radius * 1e3:g} mm")
     panel.plot(x * 1e3, y * 1e3, CLOSED, "roller's path")

@@ -28,8 +28,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, PathPatch
-from matplotlib.path import Path
+from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
 from matplotlib.transforms import Bbox
 
@@ -208,15 +207,12 @@ def paint_panel(axes: Axes, panel: Panel) -> None:
         look = {"zorder": 1.9 if rule.layer == "below" else 2.9} | line_look(rule.line)
         line(rule[f"{way}0"], **look)
     for note in panel.notes:
-        is_inside = ["domain" in ref for ref in (note.xref, note.yref)]
-        at = [10.0**end if scale.type == "log" and not inside else end for end, scale, inside
-              in zip((note.x, note.y), (panel.x, panel.y), is_inside, strict=True)]  # fmt: skip
-        frame, level = ("axes fraction" if inside else "data" for inside in is_inside), note.yanchor
+        x, y = (10.0**end if scale.type == "log" else end
+                for end, scale in ((note.x, panel.x), (note.y, panel.y)))  # fmt: skip
         axes.annotate(
-            words(note.text), (at[0], at[1]), (note.xshift / PIXEL, note.yshift / PIXEL),
-            xycoords=(next(frame), next(frame)), textcoords="offset points", ha=note.xanchor,
-            va="center" if level == "middle" else level, fontsize=note.font.size / PIXEL,
-            color=note.font.color,
+            words(note.text), (x, y), (note.xshift / PIXEL, note.yshift / PIXEL),
+            textcoords="offset points", ha=note.xanchor, va=note.yanchor,
+            fontsize=note.font.size / PIXEL, color=note.font.color,
         )  # fmt: skip
     if panel.y.scaleanchor:
         axes.set_aspect("equal", adjustable="box")
@@ -297,23 +293,13 @@ def paint_trace(axes: Axes, trace: Trace, height: float) -> None:
             look |= {"xerr": ends, "capsize": 2.0, "ecolor": "#303030"}
         axes.barh(trace.y, trace.x, trace.width, **look)
     elif trace.fill:
-        path = outline(trace.x, trace.y)
-        if path:
-            axes.add_patch(PathPatch(path, zorder=height - 1.0, **area_look(trace)))
+        axes.fill(trace.x, trace.y, zorder=height - 1.0, **area_look(trace))
     elif trace.error_y.array is not None:
         ends = [trace.error_y.arrayminus, trace.error_y.array]
         axes.errorbar(trace.x, trace.y, ends, capsize=2.0, elinewidth=1.0, zorder=height,
                       **curve_look(trace))  # fmt: skip
     else:
         axes.plot(trace.x, trace.y, zorder=height, **curve_look(trace))
-
-
-def outline(x: np.ndarray, y: np.ndarray) -> Path | None:
-    """Return the outlines of an area; those inside another one are holes."""
-    rings = np.split(np.column_stack([x, y]), np.flatnonzero(np.isnan(x)))
-    paths = [Path(np.vstack([ring, ring[:1]]), closed=True) for one in rings
-             if (ring := one[np.isfinite(one).all(axis=1)]).size]  # fmt: skip
-    return Path.make_compound_path(*paths) if paths else None
 
 
 def paint_map(axes: Axes, trace: go.Heatmap) -> None:

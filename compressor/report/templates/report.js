@@ -199,7 +199,7 @@ class Figure {
   // The figure in the width and colours of the page; where that is narrow, its panels lie below
   // each other.
   fitted() {
-    const isArea = /^(\d+|fillcolor|bgcolor|bdata)$/; // of maps and areas, in their own colours
+    const isArea = /^(\d+|bdata)$/; // of maps, in their own colours
     const { data, layout } = JSON.parse(JSON.stringify(this.sheet), (key, value) =>
       (typeof value === "string" && !isArea.test(key) ? tone(value) : value));
     const style = getComputedStyle(root);
@@ -262,9 +262,6 @@ class Figure {
         note.text = `<b>${wrapped(note.text, room + 12, note.font.size)}</b>`;
       });
     });
-    if (isDark()) {
-      data.filter((one) => one.fill).forEach((one) => { one.opacity = 0.35 * (one.opacity ?? 1); });
-    }
     return { data, layout: { ...layout, width, title: undefined, showlegend, dragmode: "zoom",
       legend: { orientation: "h", yref: "container", y: 1 - bar / layout.height,
         yanchor: "top", x: 0 },

@@ -223,9 +223,7 @@ def draw_scene(panel: report.Panel, one: xr.Dataset) -> None:
             point = one.sel({"method": "auto", "rtol": tier.rtol})
             x, y = point["seconds"].item(), point["error_acceleration"].item()
             panel.plot(x, y, TIER)
-            panel.write(
-                word, x, y, style.BLUE, shift=(-11, -2), side="right", level="top", size=8.5
-            )
+            panel.write(word, x, y, style.BLUE, shift=(-11, -2), side="right", level="top")
 
 
 def limits(study: xr.Dataset) -> tuple[float, float]:
