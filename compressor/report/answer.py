@@ -9,7 +9,7 @@ reversal of the rod load.
 import datetime
 import math
 import platform
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,15 +23,40 @@ from compressor.metrics import BARRED, JOINTS
 from compressor.outcome import Regime
 from compressor.program import PROGRAM, library_versions
 from compressor.report.figures.sweep_data import Measure, measures, name_in_words, swept_values
-from compressor.report.page import Section, format_measure, number
+from compressor.report.page import (
+    Cell,
+    PageTable,
+    Section,
+    SectionContent,
+    TableRow,
+    format_measure,
+    number,
+)
 from compressor.store import Folder, Stored, StoredStudy
 from compressor.units import Units
 
 
 def assumptions_section(has_claims: bool) -> Section:
     """Return the section of the assumptions behind all studies, and behind the paper's claims."""
-    content = {"claims": has_claims, "machine": Case.from_values({}).machine}
-    return Section("assumptions", "What to keep in mind", content, "assumptions.html")
+    machine = Case.from_values({}).machine
+    of_claims = [
+        f"The paper prints no masses. These are ours: rod {machine.rod_mass_kg:g} kg (a steel bar "
+        "of 600 × 40 × 25 mm), crosshead with piston rod and piston "
+        f"{machine.reciprocating_mass_kg:g} kg. They decide peaks and trends: a claim that fails "
+        "here is a result for these masses.",
+        "Claim (1) holds by construction: with ideal joints and a prescribed crank, no load can "
+        "change the motion.",
+    ]
+    lines = [
+        "The clearance is radial: bearing radius less journal radius.",
+        "The cam of the spring load is a reconstruction: as printed it does not close.",
+        *(of_claims if has_claims else ()),
+        "± is the error bar of a number: what a sharper solution of the same model may give. It "
+        "tells nothing of the model's own error, and nothing of numbers that had to be guessed, "
+        "such as bearing lengths, oil and a casing's mass: compsim explain --models shows how far "
+        "each moves them. Metrics leave out the start-up (solve.settle_rev).",
+    ]
+    return Section("assumptions", "What to keep in mind", SectionContent(lines=lines))
 
 
 def last_case(stored: Stored, study: StoredStudy) -> Case | None:
@@ -45,17 +70,28 @@ LIBRARIES = ("numpy", "scipy", "numba", "xarray", "h5py", "matplotlib")
 
 def provenance_section(studies: Sequence[StoredStudy], results: Folder, command: str) -> Section:
     """Return the section on program and command that made a page, and its studies."""
-    versions = library_versions(*LIBRARIES)
-    content = {
-        "program": f"{PROGRAM}, model {MODEL_VERSION}",
-        "libraries": ", ".join(f"{name} {version}" for name, version in versions.items()),
-        "platform": f"Python {platform.python_version()}, {platform.platform()}",
-        "results": Path(results).absolute(),
-        "command": command,
-        "written": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        "studies": studies,
-    }
-    return Section("provenance", "Where this comes from", content, "provenance.html")
+    lines = [
+        f"program: {PROGRAM}, model {MODEL_VERSION}",
+        f"libraries: {spell_versions(library_versions(*LIBRARIES))}",
+        f"platform: Python {platform.python_version()}, {platform.platform()}",
+        f"results: {Path(results).absolute()}",
+        f"command: {command}",
+        f"written: {datetime.datetime.now(datetime.UTC).isoformat(timespec='seconds')}",
+    ]
+    rows = [
+        TableRow([
+            Cell(study.name), Cell(study.case_file, "code"), Cell(study.command, "code"),
+            Cell(spell_versions(study.versions)), Cell(study.written), Cell(str(study.jobs)),
+        ])
+        for study in studies
+    ]  # fmt: skip
+    table = PageTable(["study", "case file", "command", "versions", "written", "jobs"], rows)
+    return Section("provenance", "Where this comes from", SectionContent(table, lines=lines))
+
+
+def spell_versions(versions: Mapping[str, str]) -> str:
+    """Return names and versions in words."""
+    return ", ".join(f"{name} {version}" for name, version in versions.items())
 
 
 MAX_FINDINGS = 3  # besides those that always stand there

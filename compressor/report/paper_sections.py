@@ -102,15 +102,12 @@ def own_figures(
     case = last_case(stored, study)
     runs = find_runs(stored, [study], analysis.cases_of(case)).usable if case else {}
     alike = comparable(runs.values())
-    lacking = [one for one in PAPER.values() if not runs.keys() >= {*one.needs}]
     figures = draw_paper(runs, units, study.name) if alike else []
     if not figures:
         reason = "since no figure has all its cases there with series" if alike else UNEQUAL
         text = f"The paper's figures are not drawn of this machine, {reason}"
         return page.StudyNote(text, study_section.file_name("jobs", study.name), "Its jobs"), []
-    numbers = ", ".join(one.title.partition(":")[0].removeprefix("Figure ") for one in lacking)
-    why = f", but not Figures {numbers}, whose cases are not all there with series" * bool(lacking)
-    text = f"The paper's figures and claims are drawn of this machine{why}"
+    text = "The paper's figures are drawn of this machine if all their cases are there with series"
     anchors = [study_section.file_name(what, study.name) for what in ("figures", "claims")]
     titles = [f"{study.name}: the paper's {what}" for what in ("figures", "claims")]
     return page.StudyNote(text, anchors[0], "Figures and claims"), [
