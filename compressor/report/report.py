@@ -52,35 +52,21 @@ def write_report(
     report's folder cannot be written.
     """
     folder, zones = Path(report), read_limits(limits, units)
-    contents = build_report(results, command, zones, units, studies)
-    files = {
-        f"{interactive.series_name(key)}.js": text.encode() for key, text in contents.series.items()
-    }
-    drawn = [one for one in contents.figures if isinstance(one, DrawnFigure)]
-    shown = [one for one in contents.figures if isinstance(one, page.ShownFigure)]
+    figures, series, make_page = build_report(results, command, zones, units, studies)
+    files = {f"{interactive.series_name(key)}.js": text.encode() for key, text in series.items()}
+    drawn = [one for one in figures if isinstance(one, DrawnFigure)]
+    shown = [one for one in figures if isinstance(one, page.ShownFigure)]
     for made in [*shown, *draw_all([partial(page.show_figure, one) for one in drawn])]:
         files |= made.files
     library = {LIBRARY: get_plotlyjs().encode()}
     if single:
-        text = contents.page(library | files)
+        text = make_page(library | files)
         store.publish(folder, text.encode(errors="backslashreplace"))
         return folder
     for name, content in (library | files).items():
         store.publish(folder / name, content, durable=False)  # the same command makes it again
-    store.publish(folder / "index.html", contents.page({}).encode(errors="backslashreplace"))
+    store.publish(folder / "index.html", make_page({}).encode(errors="backslashreplace"))
     return folder / "index.html"
-
-
-class ReportContent(NamedTuple):
-    """A report that is drawn: its figures, series by job, its page.
-
-    figures: those of the paper with their files; page: returns its text, which holds the files that
-    it is given.
-    """
-
-    figures: list[DrawnFigure | page.ShownFigure]
-    series: dict[str, str]
-    page: Callable[[Mapping[str, bytes]], str]
 
 
 def build_report(
@@ -89,8 +75,14 @@ def build_report(
     limits: Limits,
     units: Units = "usual",
     names: Sequence[str] = (),
-) -> ReportContent:
-    """Return the figures, series and page of a report, in memory; arguments as `write_report`."""
+) -> tuple[
+    list[DrawnFigure | page.ShownFigure], dict[str, str], Callable[[Mapping[str, bytes]], str]
+]:
+    """Return the figures of a report, series by job, and what makes its page, in memory.
+
+    Figures of the paper have their files; the page holds the files that it is given. Arguments as
+    of `write_report`.
+    """
     studies, stored = choose_studies(results, names), store.read_store(results, warn=True)
     # a few like runs in a sweep of one's own are no reproduction
     papers = [study for study in studies if paper_sections.is_of_paper(stored, study)]
@@ -99,18 +91,17 @@ def build_report(
     of_own = {
         one.name: paper_sections.own_figures(stored, one, units) for one in studies if one.figures
     }
-    own_notes = {name: note for name, (note, _) in of_own.items()}
-    own = [study for study in studies if not paper_sections.repeats_paper(study, paper)]
     drawn: list[DrawnStudy] = []
-    left_out: dict[str, str] = {}  # study -> why
-    for study in own:
-        notes = [note for name, note in own_notes.items() if name == study.name]
+    left_out: list[str] = []  # studies, and why
+    for study in studies:
+        if paper_sections.repeats_paper(study, paper):
+            continue
+        notes = [of_own[study.name][0]] if study.name in of_own else []
         try:
             drawn.append(drawn_study(stored, study, notes, limits, units))
         except CardError as error:
-            left_out[study.name] = f"study {study.name} is left out: {error}"
-            warnings.warn(left_out[study.name], CompsimWarning, stacklevel=3)
-    own = [study for study in own if study.name not in left_out]
+            left_out.append(f"study {study.name} is left out: {error}")
+            warnings.warn(left_out[-1], CompsimWarning, stacklevel=3)
     shown = {name for one in drawn for name in one.shown}
     cases, judged, tables = None, list[analysis.Claim](), list[page.Section]()
     if paper.stored:
@@ -125,7 +116,7 @@ def build_report(
         "figures", "The paper's figures", page.SectionContent(figures=paper_figures)
     )
     sections = [
-        answer.answer_section(summarise(own, cases, judged, drawn, [*left_out.values()], units)),
+        answer.answer_section(summarise(drawn, cases, judged, left_out, units)),
         *(one.section for one in drawn),
         *[of_paper] * bool(paper_figures),
         *chain(*(sections for _, sections in of_own.values())),
@@ -145,7 +136,7 @@ def build_report(
     title = titles.pop() if len(titles) == 1 else ""  # several machines have it in their sections
     figures = [one for section in sections for one in getattr(section.content, "figures", ())]
     make_page = partial(page.document, sections, jobs, title)
-    return ReportContent(figures, series, make_page)
+    return figures, series, make_page
 
 
 def choose_studies(results: store.Folder, names: Sequence[str]) -> list[StoredStudy]:
@@ -170,6 +161,7 @@ class DrawnStudy(NamedTuple):
     jobs: page.JobFacts
     cautions: list[str]
     shown: set[str]
+    is_trial: bool
 
 
 def drawn_study(
@@ -199,7 +191,7 @@ def drawn_study(
         return DrawnStudy(
             section, table, answer.study_findings(data, units), line,
             study_section.job_facts(data, keys), motion_cautions(stored, study, data),
-            {one.variable for one in measures(data)},
+            {one.variable for one in measures(data)}, study.is_trial,
         )  # fmt: skip
 
 
@@ -221,10 +213,9 @@ def motion_cautions(stored: Stored, study: StoredStudy, data: xr.Dataset) -> lis
 
 
 def summarise(
-    own: Sequence[StoredStudy],
+    drawn: Sequence[DrawnStudy],
     cases: xr.Dataset | None,
     judged: Sequence[analysis.Claim],
-    drawn: Sequence[DrawnStudy],
     left_out: Sequence[str],
     units: Units = "usual",
 ) -> answer.FirstScreen:
@@ -233,7 +224,7 @@ def summarise(
     cases: of the paper, as of `paper_data`; judged: its claims; left_out: studies, and why.
     """
     lines = [one.line for one in drawn]
-    told = [one for study, one in zip(own, drawn, strict=True) if not study.is_trial] or drawn
+    told = [one for one in drawn if not one.is_trial] or drawn
     each: list[tuple[str, Sequence[answer.MetricChange]]] = [
         (one.line.name, one.findings) for one in told
     ]
