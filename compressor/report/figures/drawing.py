@@ -135,12 +135,6 @@ class Panel:
         )  # fmt: skip
         self.add(made, style.zorder, (), name)
 
-    def strokes(self, x: np.ndarray, low: float, high: np.ndarray, style: LineStyle) -> None:
-        """Draw a vertical line from `low` to `high` at each x."""
-        lows = np.full(np.shape(x), low)
-        lines = np.stack([np.stack([x, lows], axis=1), np.stack([x, high], axis=1)], axis=1)
-        self.plot(*join_with_gaps(lines), style)
-
     def bars(
         self, x: ArrayLike, y: ArrayLike, style: LineStyle, name: str = "", thick: float = 1.0,
         errors: np.ndarray | None = None,

@@ -339,7 +339,7 @@ def draw_follower(panel: Panel, cam: analysis.Cam, angles: np.ndarray) -> None:
     panel.plot(np.degrees(angles), s, CLOSED, "closed cam, as simulated")
     height, left = (float(cam.printed_follower(turn)) * 1e3 for turn in (math.pi, fall))
     dots = style.LineStyle(style.RED, (1, 1.65), 1.5)
-    panel.strokes(np.degrees([fall]), left, np.array([height]), dots)
+    panel.plot(np.degrees([fall, fall]), [left, height], dots)
     panel.title, panel.x.dtick = "(b) follower displacement", 60.0
     panel.span("x", 0, 360)
     panel.span("y", -6, 1.12 * height)
