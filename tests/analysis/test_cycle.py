@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-import xarray as xr
 from conftest import listed
 
 from compressor.analysis import Cam, frame_forces, healthy_twin, impacts, read_cycle, record_of
@@ -12,7 +11,6 @@ from compressor.analysis.cycle import find_reversals
 from compressor.cases.case import Case
 from compressor.report.figures.drawing import as_csv, panels_of
 from compressor.report.figures.job import draw_analyst, read_signals, split_events
-from compressor.report.figures.rows import SweptRow, draw_segments, number_segments
 from compressor.report.figures.table import spell
 from compressor.solve.simulate import simulate
 
@@ -62,14 +60,13 @@ def test_a_part_that_does_not_begin_at_top_dead_centre_is_drawn_from_0_to_360():
     assert found.angle.size == 1201
 
 
-def test_reversals_are_where_the_load_is_zero(sensed):
+def test_reversals_are_where_the_load_is_zero(sensed, twin):
     """And as many as it has changes of sign; of the ideal machine two."""
     found = read_cycle(sensed)
     assert len(found.reversals) == (np.diff(np.sign(found.rod_load[:-1])) != 0).sum() > 2
     at = np.interp(found.reversals, found.load_angle, found.rod_load)
     assert np.abs(at).max() < 2e-3 * np.abs(found.rod_load).max()
-    twin = read_cycle(healthy_twin(sensed))
-    assert len(twin.reversals) == 2
+    assert len(read_cycle(twin).reversals) == 2
 
 
 @pytest.mark.parametrize("flight", [0, 1, 3])
@@ -122,9 +119,18 @@ def test_events_of_two_ends_are_told_apart(sensed, monkeypatch):
     }  # fmt: skip
 
 
-def test_the_caption_has_the_numbers(sensed):
-    twin = healthy_twin(sensed)
-    found = draw_analyst(sensed, twin)
+@pytest.fixture(scope="module")
+def twin(sensed):
+    return healthy_twin(sensed)
+
+
+@pytest.fixture(scope="module")
+def drawn(sensed, twin):
+    return draw_analyst(sensed, twin)
+
+
+def test_the_caption_has_the_numbers(sensed, twin, drawn):
+    found = drawn
     told = dict(found.numbers)
     record = sensed["sensor_acceleration"].values[3072:]
     peak, at = np.abs(record).max(), 360 * np.abs(record).argmax() / 3072
@@ -145,8 +151,8 @@ def test_the_caption_has_the_numbers(sensed):
     assert "impacts" not in draw_analyst(quiet, None).caption
 
 
-def test_all_that_is_marked_is_in_the_table(sensed):
-    figure = draw_analyst(sensed, healthy_twin(sensed)).figure
+def test_all_that_is_marked_is_in_the_table(sensed, drawn):
+    figure = drawn.figure
     found = read_cycle(sensed)
     strip, vibration, load = panels_of(figure)
     lanes = ["suction", "discharge", "impacts, big end", "reversals"]
@@ -164,33 +170,6 @@ def test_all_that_is_marked_is_in_the_table(sensed):
     head = as_csv(figure).splitlines()[0]
     for text in ("a (m/s²)", "F_r (kN)", "reversals", "impacts, big end"):
         assert text in head
-
-
-def test_segments_over_their_limits_are_told():
-    """Rows of made-up numbers: 3 mm/s2 in all but two segments, of which one grows."""
-    rms = np.full((3, 36), 3.0)
-    rms[:, 8], rms[:, 32] = (5.0, 5.9, 9.0), (4.0, 7.0, 9.5)
-    bars = np.where(rms == 5.9, 0.2, 0.01)
-    rows = []
-    for value, one, bar in zip(("0.1", "0.2", "0.3"), rms, bars, strict=True):
-        run = xr.Dataset({"sensor_segment_rms": ("segment", one),
-                          "sensor_segment_rms_error": ("segment", bar)})  # fmt: skip
-        rows.append(SweptRow(value).with_segments(run, np.full(36, 3.0), (2.0, True)))
-    assert [row.segments.over_limit.nonzero()[0].tolist() for row in rows] == [[], [32], [8, 32]]
-    assert [row.segments.doubtful.nonzero()[0].tolist() for row in rows] == [[], [8], []]
-    told = dict(number_segments(rows))
-    assert told["greatest rms"].startswith("9.5 m/s² in 320 to 330° at 0.3, 3.167 times that")
-    assert told["segments over their limit"] == "0 at 0.1, 1 and perhaps 1 at 0.2, 2 at 0.3"
-    assert told["the first over it"] == "320 to 330° at 0.2, 7 m/s² over a limit of 6 m/s²"
-    free = [row.with_segments(run, np.full(36, 3.0), None) for row in rows]
-    assert [*dict(number_segments(free))] == ["greatest rms"]
-    figure = draw_segments(rows, "clearance_mm").figure
-    over, doubtful = (one for one in figure.data if one.showlegend)
-    assert (over.name, over.x.tolist(), over.y.tolist()) == (
-        "over its limit", [325.0, 85.0, 325.0], [1.0, 2.0, 2.0],
-    )  # fmt: skip
-    assert (doubtful.x.tolist(), doubtful.y.tolist()) == ([85.0], [1.0])
-    np.testing.assert_allclose(10.0 ** figure.data[0].z[2, 32], 9.5 / 3)
 
 
 def test_gas_and_inertia_make_the_rod_load():
