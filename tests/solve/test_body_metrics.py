@@ -5,7 +5,6 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import CHAOTIC
 
 from compressor.analysis.shaking import healthy_twin
 from compressor.cases.case import Case
@@ -110,7 +109,7 @@ def test_settled_revolutions_need_not_begin_at_top_dead_centre(start):
     half, whole = (
         simulate(Case.from_values({
             **SENSED, "body": body, "sensor": sensor,
-            "solve": {"duration_rev": settle + 2, "settle_rev": settle, "rtol": 1e-8},
+            "solve": {"duration_rev": settle + 2, "settle_rev": settle, "rtol": 1e-6},
         })) for settle in (2.5, 2)
     )  # fmt: skip
     if start == "steady":
@@ -118,23 +117,6 @@ def test_settled_revolutions_need_not_begin_at_top_dead_centre(start):
     for name in ("sensor_segment_rms", "sensor_segment_peak"):
         apart = np.abs(half[name].values - whole[name].values).max()
         assert apart < 0.05 * whole[name].values.max()
-
-
-def test_a_chaotic_motion_has_intervals_of_its_averages():
-    """Batch means over revolutions; peaks and what is made of them are not known."""
-    values = {**CHAOTIC, **BODY, "sensor": {"threshold_m_per_s2": 50.0},
-              "solve": {"duration_rev": 13, "settle_rev": 1, "accuracy": "draft"}}  # fmt: skip
-    run = simulate(Case.from_values(values))
-    assert run.attrs["regime"] == "chaotic"
-    for name in ("sensor_peak", "sensor_crest_factor", "sensor_kurtosis", "sensor_segment_peak"):
-        assert np.isinf(run[f"{name}_error"]).all()
-    per_turn = run["sensor_acceleration"].values.reshape(12, -1)
-    square = np.mean(per_turn**2, axis=1)
-    error = 2.200985 * square.std(ddof=1) / math.sqrt(12)  # Student's t of 11 degrees, 97.5 %
-    rms = float(run["sensor_rms"])
-    assert float(run["sensor_rms_error"]) == pytest.approx(error / (2 * rms), rel=1e-3)
-    bar = float(run["sensor_counts_per_rev_error"].sel(threshold="first"))
-    assert 0 < bar < 0.5 * float(run["sensor_counts_per_rev"].sel(threshold="first"))
 
 
 FINE = {"duration_rev": 2, "settle_rev": 1, "output_step_deg": 0.3}

@@ -186,11 +186,11 @@ def test_error_bars_hold_with_laws():
     """Of the default promise, by far tighter runs. With six restitutions each, 95 % of 500 do."""
     shares, chaotic = [], 0
     laws = "gonthier", "flores", "lankarani_nikravesh", "hu_guo"
-    for law, restitution in itertools.product(laws, (0.3, 0.5, 0.6)):
+    for law, restitution in itertools.product(laws, (0.3, 0.6)):
         contact = {"law": law, "restitution": restitution}
         values = {"joint": "both", "clearance_mm": 0.2, "contact": contact}
         run, exact = (
-            simulate(Case.resolve({**values, "solve": solve}))
+            simulate(Case.resolve({**values, "solve": {"duration_rev": 2, **solve}}))
             for solve in ({}, {"rtol": 1e-10, "error_bars": False})
         )
         if run.attrs["regime"] == "chaotic":
@@ -205,5 +205,5 @@ def test_error_bars_hold_with_laws():
                 known = np.isfinite(bar) & np.isfinite(away)
                 shares += (away[known] / np.maximum(bar[known], 1e-300)).tolist()
     assert chaotic <= 1
-    assert len(shares) > 225
+    assert len(shares) > 150
     assert np.mean(np.array(shares) <= 1.0) > 0.85

@@ -10,7 +10,7 @@ from conftest import store_cases
 from compressor.analysis import CLEARANCES, FAULTS, cases_of, claims
 from compressor.cases import Case, design, load_studies, templates
 from compressor.report.figures.drawing import panels_of
-from compressor.solve.simulate import simulate
+from compressor.store.stored import read_store
 from compressor.store.studies import find_study
 from compressor.studies import claims as paper
 
@@ -42,7 +42,8 @@ def test_margins_of_stored_jobs_are_those_of_the_report(stored):
     assert found["rod_mass_kg"].values.tolist() == [3.0, 4.7]
     assert found["rod_mass_kg"].attrs["units"] == "kg"
     machine = Case.from_values({"machine": {"rod_mass_kg": 3.0}, "solve": QUICK})
-    runs = {name: simulate(case) for name, case in cases_of(machine).items()}
+    jobs = read_store(stored)
+    runs = {name: jobs.job(case.key) for name, case in cases_of(machine).items()}
     expected = [claim.margin for claim in claims(runs)]
     one = found.sel(machine=0)
     assert one["margin"].values == pytest.approx([m.value for m in expected], rel=1e-9)
