@@ -79,13 +79,9 @@ def conditions(key: str) -> list[tuple[str, str]]:
     rows = [table()[part] for part in stands_for(key) or (key,)]
     rows = rows[:1] if key == LED else rows
     shared = [one for one in rows[0].read if all(one in row.read for row in rows)]
-    own = [[one for one in row.read if one not in shared] for row in rows]
-    alone = [one for of in own for one in of]
-    if len(alone) == len(own):  # one each, which may have alternatives of their own
-        alone = [*dict.fromkeys(" or ".join(alone).split(" or "))]
-    else:
-        alone = [" and ".join(f"({one})" for one in of) for of in own]
-    either = [" or ".join(alone)] if all(own) else []
+    # of each part one, which may have alternatives of its own, or of none
+    own = " or ".join(one for row in rows for one in row.read if one not in shared)
+    either = [" or ".join(dict.fromkeys(own.split(" or ")))] if own else []
     return [(group if one in whole else key, one) for one in (*shared, *either)]
 
 

@@ -15,7 +15,7 @@ from typing import Any
 from compressor.cases.case import Case
 from compressor.cases.checks import DOUBLES, expand_synonyms, key_of, row_of, stands_for, value_of
 from compressor.cases.comparison import NoComparison, Test, comparison, condition
-from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of
+from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of, reads
 from compressor.cases.keys import (
     covers,
     merge_block,
@@ -46,11 +46,6 @@ IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
 WHOLE_FILE = ("name", "blocks", "report")
 AT_TOP = "needs keys at the top, such as `joint: big_end`, with a space after the colon"
 NO_BLOCKS = "needs a list of mappings, such as [{load: none}, {joint: both}]"
-# values with which a case is as without the key, and so has None
-AS_WITHOUT = {
-    "clearance_mm": 0.0, "machine.counterweight_kg_mm": 0.0, "contact.geometry": "external",
-    "friction.law": "adams", "friction.ideal_joints": False,
-}  # fmt: skip
 NO_CHANGES, NOWHERE = Tree({}, {}), Place("")
 NO_DRAWS = "samples nothing: give a key {random: [least, greatest]}, lhs, sobol or saltelli"
 
@@ -353,10 +348,8 @@ def axis_value(case: Case, given: Mapping[str, Any], key: str) -> Any:
 
     given: nested values of the file, which alone have what a case writes as without the key.
     """
-    own, told = value_of(case, key), value_of(given, key)
-    if own is None and told == AS_WITHOUT.get(key):
-        return told
-    return own
+    own = value_of(case, key)
+    return value_of(given, key) if own is None and reads(case, key) else own
 
 
 Where = tuple[Place, str]  # a key of a file, which may be given for several blocks or files
