@@ -133,8 +133,6 @@ CYLINDER_KEYS = (
     "indicator", "ambient_MPa", "smooth_deg",
 )  # fmt: skip
 NO_LOSS = PerValve(0.0, 0.0)
-# what the paper prints of its cylinder, the defaults: another value makes one of one's own, too
-PRINTED = ("piston_radius_mm", "head_clearance_mm", "suction_MPa", "discharge_MPa", "exponent")
 OWN_CYLINDER = (
     "a cylinder of one's own: any key of `gas` but this one and {other}, the stroke or the rod's "
     "length is given"
@@ -229,15 +227,14 @@ class Gas:
 
     def __post_init__(self) -> None:
         """Fill in what a cylinder's keys leave open; what is as without a key goes without it."""
-        values, usual = vars(self), type(self).__dataclass_fields__
+        values = vars(self)
         if self.is_cylinder:
             filled = {"action": "single", "unloaded": "none", "valve_loss_percent": NO_LOSS}
             values.update({key: value for key, value in filled.items() if values[key] is None})
-        is_own = self.is_cylinder or any(values[key] != usual[key].default for key in PRINTED)
         if self.switching is None:
-            values["switching"] = "exact" if is_own else "paper"
+            values["switching"] = "exact" if self.is_cylinder else "paper"
         if self.back_pressure_MPa is None:
-            values["back_pressure_MPa"] = ATMOSPHERE_MPA if is_own else 0.0
+            values["back_pressure_MPa"] = ATMOSPHERE_MPA if self.is_cylinder else 0.0
         if self.clearance_percent and self.clearance_percent.head is not None:
             values["head_clearance_mm"] = None
 
