@@ -305,7 +305,7 @@ def _check_cases(
 
     Raises CaseFileError.
     """
-    wrong: dict[bool, Located] = {False: {}, True: {}}  # misfits are told once each value is good
+    wrong: Located = {}
     keys: list[str] = []
     selected: list[int] = []
     values: dict[str, list[Any]] = {key: [] for key in columns}
@@ -317,10 +317,9 @@ def _check_cases(
         try:
             case = block.case(place)
         except CaseError as error:
-            located = block.locate(error, block.rows_of(place))
-            wrong[error.is_misfit] = located | wrong[error.is_misfit]
+            wrong = block.locate(error, block.rows_of(place)) | wrong
             continue
-        if not any(wrong.values()):
+        if not wrong:
             keys.append(case.key)
             given = block.given_of(place) if columns or only else {}
             for key in columns:
@@ -328,10 +327,9 @@ def _check_cases(
             if only is None or is_selected(only, given, case):
                 selected.append(number)
     progress(total, total, "")
-    found = wrong[False] or wrong[True]
-    problems = [*itertools.islice(found.values(), MAX_CONFLICTS)]
-    if len(found) > MAX_CONFLICTS:
-        message = f"{len(found)} conflicts between swept values; the first {MAX_CONFLICTS} are"
+    problems = [*itertools.islice(wrong.values(), MAX_CONFLICTS)]
+    if len(wrong) > MAX_CONFLICTS:
+        message = f"{len(wrong)} conflicts between swept values; the first {MAX_CONFLICTS} are"
         problems.append(FileProblem(Place(file.path), "", message))
     if problems:
         raise CaseFileError(problems)
