@@ -67,12 +67,7 @@ class Machine:
     """The mechanism and its masses; a case's `machine`.
 
     The paper gives no masses: the defaults are assumptions. What is left out follows from the
-    rest, such as the inertia of a uniform rod, m L^2 / 12:
-
-    >>> import compressor
-    >>> machine = compressor.Case.from_values({"machine": {"rod_mass_kg": 6}}).machine
-    >>> round(machine.rod_inertia_kg_m2, 6)  # 6 kg * (0.6 m)^2 / 12
-    0.18
+    rest, such as the inertia of a uniform rod, m L^2 / 12.
     """
 
     crank_radius_mm: float = number(120.0, "(0, 1e5]", "crank radius R", "Table 1")
@@ -314,13 +309,7 @@ class Contact:
 
     ADAMS's IMPACT (Eq. 14) by default: F = K d^p + C(d) d' with the penetration d; C grows to C_max
     up to the depth of full damping. Others damp by K d^p times the penetration's rate over the
-    speed at which journal and bore met; the name of one and a coefficient of restitution choose it:
-
-    >>> import compressor
-    >>> contact = {"law": "flores", "restitution": 0.7}
-    >>> values = {"joint": "big_end", "clearance_mm": 0.2, "contact": contact}
-    >>> compressor.Case.from_values(values).contact.least_approach_mm_per_s
-    10.0
+    speed at which journal and bore met; the name of one and a coefficient of restitution choose it.
     """
 
     law: str = choice(
@@ -391,12 +380,6 @@ class Friction:
     By default ADAMS's smoothed Coulomb law (Table 3). coulomb_tanh, threlfall and ambrosio go to
     the dynamic coefficient, the first two over the stiction velocity, the last from there to the
     friction velocity. lugre sticks by bristles; its stiction velocity is Stribeck's.
-
-    `False` leaves it out:
-
-    >>> import compressor
-    >>> compressor.Case.from_values({"friction": False}).friction is None
-    True
     """
 
     static: float = number(0.23, "[0, 10]", "static coefficient", "Table 3", judged=(0, 0.5))
@@ -440,15 +423,7 @@ class Solve:
     """How far, how finely and how exactly to integrate; a case's `solve`.
 
     `accuracy` is a promise about the run, which is checked: a word for the relative L2 error of
-    the acceleration, or the relative error of metrics by name. A long run for a chaotic motion,
-    and one that ends when the greatest force is known to 1 %:
-
-    >>> import compressor
-    >>> compressor.Case.from_values({"solve": {"duration_rev": 50}}).duration  # s, at 500 rpm
-    6.0
-    >>> solve = {"accuracy": {"peak_contact_force": 0.01}}
-    >>> compressor.Case.from_values({"solve": solve}).targets
-    (('peak_contact_force', 0.01),)
+    the acceleration, or the relative error of metrics by name.
     """
 
     duration_rev: float | str | None = number(

@@ -276,12 +276,7 @@ class Wear:
     """How the rod's bores wear in joints with clearance; a case's `wear`, None by default.
 
     `compsim wear` opens the clearances over operating hours, by Archard's law. A single run has
-    the clearances that are given. `True` stands for the defaults:
-
-    >>> import compressor
-    >>> case = compressor.Case.from_values({"joint": "both", "clearance_mm": 0.1, "wear": True})
-    >>> case.wear.limit_mm  # twice the greater clearance
-    0.2
+    the clearances that are given. `True` stands for the defaults.
     """
 
     coefficient_mm3_per_N_m: float = value(
