@@ -11,13 +11,12 @@ from compsim.progress import ProgressReporter, read_cases
 
 @click.command()
 @options.configs
-@options.jobs("Estimate the sweep's cost with this many worker processes.")
 @click.option("--models", is_flag=True, help="Measure what moves each metric, numbers or models.")
 @options.results
 @options.set_keys
 @options.max_jobs
 @options.as_json
-def explain(configs, jobs, models, folder, as_json, **how) -> int:
+def explain(configs, models, folder, as_json, **how) -> int:
     """Estimate the cost and droppable features of a case.
 
     \b
@@ -34,9 +33,6 @@ def explain(configs, jobs, models, folder, as_json, **how) -> int:
 
     --set clearance_mm=0.3 chooses another job. Exit code 3 if such a job fails.
     """
-    if jobs and models:
-        text = "-j is for the estimate of a sweep, which --models does not make: leave out -j"
-        raise click.UsageError(text)
     from compressor.cases import points
     from compressor.studies.tradeoff.changes import list_changes, model_table
     from compressor.studies.tradeoff.explain import explain as explain_job
@@ -56,7 +52,7 @@ def explain(configs, jobs, models, folder, as_json, **how) -> int:
             if models:
                 data = explain_models(study, job, progress)
             else:
-                found.append(explain_job(study, job, jobs or cores(), progress))
+                found.append(explain_job(study, job, cores(), progress))
         if not models:
             code = screen.SOME_FAILED if found[-1]["reason"] else code
             if not as_json:

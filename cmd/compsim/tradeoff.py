@@ -12,16 +12,9 @@ from compsim.progress import ProgressReporter
 @click.command()
 @options.configs
 @options.results
-@click.option(
-    "-j",
-    "--jobs",
-    type=options.COUNT,
-    default=1,
-    help="Run so many at once; times are then less exact.",
-)
 @options.set_keys
 @options.quiet
-def tradeoff(configs, folder, jobs, overrides, quiet) -> int:
+def tradeoff(configs, folder, overrides, quiet) -> int:
     """Measure speed against accuracy, by method and tolerance.
 
     \b
@@ -47,7 +40,7 @@ def tradeoff(configs, folder, jobs, overrides, quiet) -> int:
         study, texts = load_methods(config, overrides, folder)
         with ProgressReporter(quiet, folder=folder) as progress:
             command = shlex.join(["compsim", "tradeoff", config, "-r", folder])
-            sweep([study], folder, jobs, progress, Options(command, texts))
+            sweep([study], folder, 1, progress, Options(command, texts))  # jobs are timed
         found = work_precision(folder, study)
         screen.print_text(*list_fastest(found))
         path = Path(folder, "tradeoff", study.name)

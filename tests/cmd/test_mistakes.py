@@ -87,7 +87,6 @@ MISTAKES = [
     ("plot wear --over sped_rpm", "wear has no axis 'sped_rpm'; its axes are clearance_mm, "),
     ("identify good.csv --study wear", "good.csv: cannot be read", "time_s,acceleration_m_per_s2"),
     # questions
-    ("explain good.yaml --models -j 2", "-j is for the estimate of a sweep"),
     ("tradeoff again/wear.yaml", "again/wear.yaml: a job of wear has no joint with clearance"),
     ("tradeoff good.yaml --set solve.methd=auto", "did you mean solve.method?"),
     ("follow good.yaml", "Missing option '--over'"),
