@@ -29,14 +29,11 @@ from compressor.cases.checks import (
     walk_leaves,
 )
 from compressor.cases.comparison import NoComparison, Test, comparison
-from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.keys import drop, path_of, put
 from compressor.cases.parameter import CaseError, integer, make_group, quote_value
 from compressor.cases.swept import FORMS, NoSweep, Sweep, design, design_size, sweep_of
 from compressor.cases.table import outside_identity
 from compressor.cases.yaml_reader import FileProblem, Place, Tree
-
-RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
 
 Factors = list[tuple[str, ...]]  # keys that advance together
 Located = dict[tuple[Place, str], FileProblem]  # by the place and the key that a problem is about
@@ -211,20 +208,18 @@ def mark_path(key: str, path: str) -> str:
 
 
 def reader(given: Mapping[str, Any], case: Callable[[], Case | None]) -> Callable[[str], Any]:
-    """Return the function that gives a job's value of a key: as given, the default, or the case's.
+    """Return the function that gives a job's value of a key: as given, or else as its case has it.
 
     given: nested values without synonyms. case: makes the job's case, and is called only for what
-    a case fills in by other keys, such as the inertia of a uniform rod.
+    is not given; None where values do not fit, for which the default stands.
     """
 
     def value(key: str) -> Any:
         found, row = value_of(given, key), row_of(key)
         if found is not None or not row:
             return found
-        if row.default is None or stands_for(key):
-            return value_of(case(), key)
-        has_rival = key in RIVALS and value_of(given, RIVALS[key]) is not None
-        return None if has_rival else row.default
+        made = case()
+        return value_of(made, key) if made else row.default
 
     return value
 

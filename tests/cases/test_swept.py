@@ -175,6 +175,7 @@ LOADS = ONE + "clearance_mm: {big_end: 0.2}\nload: [none, spring]\n"
         (LOADS, "clearance_mm == 0.2 and load == none", [0]),
         (LOADS, "machine.speed_rpm == 500 and load == none", [0]),
         (LOADS, "clearance_mm.small_end > 0", []),
+        (LOADS, "lubricant.viscosity_mPa_s > 20", []),  # which a dry joint has not
     ],
 )  # fmt: skip
 def test_a_comparison_sees_what_a_case_fills_in(read, text, condition, jobs):
