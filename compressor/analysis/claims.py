@@ -210,7 +210,7 @@ def steady_impacts(runs: Runs) -> Verdict:
     for c in CLEARANCES:
         big, small = (share_apart(runs[label(joint, c)], joint) for joint in JOINTS)
         margins.append(exceeds(big, small, EXCESS))
-        rows.append((f"{c:g} mm", f"{big.value:.1%} and {small.value:.1%} of the crank angle"))
+        rows.append((f"{c:g} mm", f"big end {big.value:.1%}, small end {small.value:.1%}"))
     return margins, rows
 
 

@@ -1,7 +1,6 @@
 """A store -> figures and a page; the tools by which studies draw."""
 
 from compressor.report.figures import style
-from compressor.report.figures.contours import contour_lines
 from compressor.report.figures.drawing import Panel, PlotlyFigure, make_grid, midway, rectangle
 from compressor.report.figures.sweep_data import Measure, measures, positions
 from compressor.report.plots import PlotChoice, title_figure, write_figure, write_plots

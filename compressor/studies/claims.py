@@ -244,11 +244,8 @@ def draw_map(plane: xr.Dataset) -> report.PlotlyFigure:
     *shown, number = drawing.panels
     for claim, panel in zip(OF_MASSES, shown, strict=True):
         margin = plane["margin"].sel(claim=claim).transpose(RECIPROCATING, ROD).values
-        panel.map(x, y, margin, style.palette("RdBu"), (-REACH, REACH), "margin",
+        panel.map(x, y, margin, style.palette("RdBu", 8), (-REACH, REACH), "margin",
                   has_scale=panel is panels[0, 3])  # fmt: skip
-        if (margin >= 0.0).any() and (margin < 0.0).any():
-            line = report.contour_lines(x, y, (margin >= 0.0).astype(float), [0.5])
-            panel.plot(*line, style.LineStyle(style.BLACK, linewidth=1.0))
         panel.title = f"claim {claim}"
     count = (plane["margin"] >= 0.0).transpose("claim", RECIPROCATING, ROD).sum("claim").values
     number.map(x, y, count.astype(float), style.palette("cividis", 7), (1.5, 8.5))
