@@ -16,7 +16,7 @@ from compsim.cli import VERBS, cli
 
 from compressor.cases.checks import DOUBLES, stands_for
 from compressor.cases.json_schema import case_schema
-from compressor.cases.load import MAX_JOBS, load_cases, load_studies
+from compressor.cases.load import MAX_JOBS, CaseFileError, load_cases, load_studies
 from compressor.cases.table import table
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
@@ -123,12 +123,13 @@ def test_plans_have_the_jobs_that_they_say(command, jobs, tmp_path, monkeypatch)
     monkeypatch.chdir(tmp_path)
     _, path, *words = shlex.split(command)
     given = dict(zip(words[::2], words[1::2], strict=True))
-    (study,) = load_studies(
-        path,
-        overrides=[given["--set"]] if "--set" in given else [],
-        only=given.get("--only", ""),
-        max_jobs=int(given.get("--max-jobs", MAX_JOBS)),
-    )
+    how = {"overrides": [given["--set"]] if "--set" in given else []}
+    if "--max-jobs" in given:  # these many are counted, not made
+        assert MAX_JOBS < int(jobs) <= int(given["--max-jobs"])
+        with pytest.raises(CaseFileError, match=f" {jobs} jobs are more than {MAX_JOBS}"):
+            load_studies(path, **how)
+        return
+    (study,) = load_studies(path, only=given.get("--only", ""), **how)
     assert len(study.selected) == int(jobs)
 
 

@@ -141,15 +141,11 @@ def test_jobs_that_do_harm_are_failed_jobs(studies, tmp_path, monkeypatch):
 def test_what_asks_the_program_to_end_is_no_failure_of_a_job():
     """Ctrl-C in a job of this process was stored as a bug of it."""
 
-    class Interrupted(BaseException):
-        """As the command line raises it."""
+    def interrupt(_):
+        raise KeyboardInterrupt
 
-    def work(error):
-        raise error
-
-    with pytest.raises(Interrupted):
-        attempt(work, Interrupted())
-    assert attempt(work, SystemExit(3)).reason == "internal_error"
+    with pytest.raises(KeyboardInterrupt):
+        attempt(interrupt, None)
 
 
 def test_a_job_that_cannot_be_stored_ends_the_sweep(studies, tmp_path, in_process):
