@@ -20,7 +20,7 @@ from compressor.analysis.runs import CLEARANCES, FAULTS, case_of, label
 from compressor.cases import Case, load_cases, load_studies
 from compressor.program import CompsimWarning
 from compressor.reasons import Reason
-from compressor.report import write_report
+from compressor.report import interactive, write_report
 from compressor.report.figures import FIGURES, pictures
 from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.table import spell
@@ -530,8 +530,10 @@ def test_runs_on_other_grids_cannot_be_drawn_together(heavy_store):
     assert not comparable([run.isel(time=slice(None, -1)) for run in turn])
 
 
-def test_figures_captions_and_claims_are_the_machine_s(heavy_store, tmp_path):
+def test_figures_captions_and_claims_are_the_machine_s(heavy_store, tmp_path, monkeypatch):
+    monkeypatch.setattr(interactive, "MAX_SERIES", 2)
     write_report(heavy_store, tmp_path / "out")
+    assert len([*(tmp_path / "out").glob("job-*.js")]) == 2  # of ten jobs
     assert {path.stem for path in (tmp_path / "out").glob("*.png")} == FILES  # and no sweep
     found, study = read(tmp_path / "out"), read_studies(heavy_store)[0]
     order = [i for i in found.ids if i in ("figures-heavy", "heavy-figure-08", "study-heavy")]
