@@ -123,16 +123,16 @@ def test_the_paper_s_cases_are_periodic_and_not_searched(joint, monkeypatch):
 
 
 def test_a_run_without_errors_has_no_regime_unless_its_horizon_is_asked_for():
-    plain = measure(case(CHAOTIC, error_bars=False))
+    plain = measure(case(CHAOTIC, error_bars=False, duration_rev=2))
     assert plain.attributes["regime"] == ""
-    asked = measure(case(CHAOTIC, error_bars=False, horizon=True))
+    asked = measure(case(CHAOTIC, error_bars=False, horizon=True, duration_rev=2))
     assert asked.attributes["regime"] == "chaotic"
     assert math.isnan(asked.numbers["revolutions"])
     assert math.isnan(asked.numbers["rms_acceleration_error"])
 
 
 def test_a_tolerance_promises_nothing_and_is_searched_by_its_bars():
-    found = measure(case(CHAOTIC, rtol=1e-6))
+    found = measure(case(CHAOTIC, rtol=1e-6, duration_rev=2))
     assert (found.status, found.attributes["regime"]) == ("ok", "chaotic")
     found = measure(case(rtol=1e-6))
     assert found.attributes["regime"] == "periodic"
@@ -178,9 +178,9 @@ def test_a_case_that_needs_more_than_its_budget_is_refused_in_these_words(monkey
 
 def test_what_cannot_be_told_in_the_time_is_undecided(monkeypatch):
     monkeypatch.setattr(Search, "parts", lambda self, whole: False)
-    found = measure(case(CHAOTIC, rtol=1e-6))
+    found = measure(case(CHAOTIC, rtol=1e-6, duration_rev=2))
     assert (found.status, found.attributes["regime"]) == ("ok", Regime.UNDECIDED)
-    found = measure(case(CHAOTIC, accuracy="reference"))
+    found = measure(case(CHAOTIC, accuracy="reference", duration_rev=2))
     assert (found.reason, found.attributes["regime"]) == ("accuracy_not_reached", "undecided")
 
 

@@ -31,22 +31,24 @@ def made(count, seed, equal=False, joints=JOINTS):
 
 @pytest.fixture(scope="module")
 def identifier():
-    return identify.Identifier.fit(made(600, 1))
+    return identify.Identifier.fit(made(400, 1))
 
 
 def test_the_joint_is_told_and_its_clearance_lies_in_its_interval(identifier):
     new = made(200, 2)
-    right, held = [], []
+    right, held, fits = [], [], []
     for joint, clearance, row in zip(new.joints, new.clearances, new.features, strict=True):
         answer = identifier.identify(row)
         assert sum(one.probability for one in answer.candidates) == pytest.approx(1.0)
         right.append(answer.candidates[0].joint == joint)
+        fits.append(answer.fits)
         own = next(one for one in answer.candidates if one.joint == joint)
         for side, interval in own.clearances.items():
             truth = clearance[["big_end", "small_end"].index(side)]
             held.append(interval.low <= truth <= interval.high)
     assert np.mean(right) > 0.97
     assert identifier.right > 0.97
+    assert np.mean(fits) > 0.96
     assert 0.84 < np.mean(held) < 0.96
 
 
@@ -60,9 +62,7 @@ def test_candidates_are_ranked_with_the_clearances_of_their_ends(identifier):
     assert answer.candidates[0].joint == "both"
 
 
-def test_own_records_fit_and_others_do_not(identifier):
-    own = [identifier.identify(row).fits for row in made(200, 4).features]
-    assert np.mean(own) > 0.96
+def test_records_of_something_else_do_not_fit(identifier):
     row = made(4, 5).features[1].copy()
     row[[8, 9]] += (9.0, -9.0)
     answer = identifier.identify(row)
@@ -119,9 +119,9 @@ def test_intervals_are_the_exact_ones(clearance):
 def test_intervals_are_wide_where_errors_are_great():
     """Noise that grows with the clearance: a width of the middle would be wrong at both ends."""
     rng = np.random.default_rng(3)
-    logs = rng.uniform(-3.0, 0.0, 400)
-    points = (logs + rng.normal(0, 1.0, 400) * 0.1 * (3.2 + logs))[:, None]
-    found = identify.Clearance.fit(points, logs[:, None], np.arange(400))
+    logs = rng.uniform(-3.0, 0.0, 300)
+    points = (logs + rng.normal(0, 1.0, 300) * 0.1 * (3.2 + logs))[:, None]
+    found = identify.Clearance.fit(points, logs[:, None], np.arange(300))
     (small,), (large,) = map(found.locate, np.array([[-2.7], [-0.5]]))
     assert np.log(large.high / large.low) > 2.5 * np.log(small.high / small.low)
 
