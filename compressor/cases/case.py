@@ -50,7 +50,6 @@ from compressor.cases.parameter import (
     BY_PART,
     CaseError,
     PerJoint,
-    Problem,
     Targets,
     first_tolerance,
     make_group,
@@ -59,6 +58,7 @@ from compressor.cases.parameter import (
     quote_value,
 )
 from compressor.cases.table import GROUPS, TOP, WORDS, outside_identity, parts_by_key, table
+from compressor.cases.yaml_reader import Problem
 from compressor.metrics import JOINTS
 
 MODEL_VERSION = "3"  # of equations and of the meaning of what is stored; part of a key

@@ -21,7 +21,6 @@ from compressor.cases.parameter import (
     PART_WORDS,
     WRITTEN,
     Parameter,
-    Problem,
     adapter_of,
     convert_other,
     quote_value,
@@ -29,7 +28,7 @@ from compressor.cases.parameter import (
     to_python,
 )
 from compressor.cases.table import GROUPS, TOP, WORDS, parts_by_key, table
-from compressor.cases.yaml_reader import Path, is_number
+from compressor.cases.yaml_reader import Path, Problem, is_number
 
 
 @lru_cache(1024)  # asked for of each key of each job

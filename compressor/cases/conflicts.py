@@ -19,9 +19,9 @@ from compressor.cases.comparison import condition
 from compressor.cases.groups import CRANK_END, ENDS
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
 from compressor.cases.optional_groups import MAX_RATIO, MIN_RATIO
-from compressor.cases.parameter import IMPLAUSIBLE, LED, Problem
+from compressor.cases.parameter import IMPLAUSIBLE, LED
 from compressor.cases.table import GROUPS, READ, WORDS, table
-from compressor.cases.yaml_reader import is_number
+from compressor.cases.yaml_reader import Problem, is_number
 from compressor.metrics import AXES, JOINTS
 
 Case = Any  # that of `compressor.cases.case`, which needs these rules

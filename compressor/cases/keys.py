@@ -7,7 +7,7 @@ from typing import Any
 from compressor.cases.checks import DOUBLES, SWEEP, is_by_part, key_of, stands_for, walk_leaves
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.table import parts_by_key
-from compressor.cases.yaml_reader import FileProblem, Path, Place, Tree, read_text, shorten
+from compressor.cases.yaml_reader import Path, Place, Problem, Tree, read_text, shorten
 
 
 def path_of(key: str) -> Path:
@@ -79,20 +79,20 @@ def override(file: Tree, changes: Tree) -> Tree:
     return Tree(values, kept | new)
 
 
-def read_overrides(texts: Sequence[str]) -> tuple[Tree, list[FileProblem]]:
+def read_overrides(texts: Sequence[str]) -> tuple[Tree, list[Problem]]:
     """Return the values, by path, of each `key=value` of the command line, and their problems."""
     values: dict[Path, Any] = {}
     places: dict[Path, tuple[Place, Place]] = {}
-    problems: list[FileProblem] = []
+    problems: list[Problem] = []
     for text in texts:
         key, equals, value = (part.strip() for part in text.partition("="))
         place, path = Place(f"--set {shorten(text)}"), path_of(key)
         if not key or not equals:
             message = "needs the form key=value, such as joint=both"
-            problems.append(FileProblem(place, "", message))
+            problems.append(Problem("", message, place))
             continue
         if any(path[: len(one)] == one[: len(path)] for one in values):
-            problems.append(FileProblem(place, key, "is set twice"))
+            problems.append(Problem(key, "is set twice", place))
         tree, wrong = read_text(value, place)
         problems += wrong
         if tree:

@@ -8,7 +8,7 @@ whole, for its key and for what is wrong with its values, and again when it is u
 import itertools
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Any
 
@@ -30,8 +30,8 @@ from compressor.cases.table import WORDS, outside_identity, table
 from compressor.cases.yaml_reader import (
     START,
     CaseFileError,
-    FileProblem,
     Place,
+    Problem,
     Tree,
     read_file,
     shorten,
@@ -92,9 +92,9 @@ def load_studies(
         try:
             test = comparison(only)
         except NoComparison as error:
-            problems.append(FileProblem(selection, "", str(error)))
+            problems.append(Problem("", str(error), selection))
     if not paths:
-        problems.append(FileProblem(NOWHERE, "", f"needs the path of a case file; {START}"))
+        problems.append(Problem("", f"needs the path of a case file; {START}", NOWHERE))
     mistaken = bool(problems)
     files = [_read(os.fsdecode(path), NO_CHANGES if mistaken else changes) for path in paths]
     problems += [problem for file in files for problem in file.problems]
@@ -117,7 +117,7 @@ def load_studies(
         }
     problems += unread.values()
     if not problems and not any(study.selected for study in studies):
-        problems.append(FileProblem(selection, "", NONE_SELECTED))
+        problems.append(Problem("", NONE_SELECTED, selection))
     if problems:
         raise CaseFileError(problems)
     return studies
@@ -140,7 +140,7 @@ class CaseFile:
     """
 
     path: str
-    problems: list[FileProblem]
+    problems: list[Problem]
     tree: Tree | None = None
     changes: Tree = NO_CHANGES
     name: str = ""
@@ -160,13 +160,13 @@ def _read(path: str, changes: Tree) -> CaseFile:
     message = table()["name"].check(stem if name is None else name)
     if message and name is None:
         message = f"the file's name gives none: {message}; set name"
-        problems.append(FileProblem(place, "name", message))
+        problems.append(Problem("name", message, place))
     report, wrong = read_own(Report, "report", whole)
     name = "" if message else name or stem
     return CaseFile(path, problems + wrong, tree, changes, name, place, report)
 
 
-def _find_shared_names(files: Sequence[CaseFile]) -> list[FileProblem]:
+def _find_shared_names(files: Sequence[CaseFile]) -> list[Problem]:
     """Return studies that would be stored under one name; on some disks `A` and `a` are one."""
     first: dict[str, CaseFile] = {}
     problems = []
@@ -174,7 +174,7 @@ def _find_shared_names(files: Sequence[CaseFile]) -> list[FileProblem]:
         other = first.setdefault(file.name.casefold(), file)
         if file.name and other is not file:
             message = f"{other.path} and {file.path} would be stored under one name, {file.name}"
-            problems.append(FileProblem(file.name_place, "name", message))
+            problems.append(Problem("name", message, file.name_place))
     return problems
 
 
@@ -243,7 +243,7 @@ def _blocks(file: CaseFile, max_jobs: int) -> list[Block]:
     raise CaseFileError(problems + left)
 
 
-def _block_trees(tree: Tree, changes: Tree, max_jobs: int) -> tuple[list[Tree], list[FileProblem]]:
+def _block_trees(tree: Tree, changes: Tree, max_jobs: int) -> tuple[list[Tree], list[Problem]]:
     """Return the values of each block over those of the file; the file's alone without blocks."""
     if ("blocks",) in changes.values:
         tree = override(tree, Tree({("blocks",): changes.values["blocks",]}, changes.places))
@@ -270,7 +270,7 @@ def _block_trees(tree: Tree, changes: Tree, max_jobs: int) -> tuple[list[Tree], 
     return found, problems
 
 
-def _find_too_many(blocks: Sequence[Block], max_jobs: int) -> FileProblem | None:
+def _find_too_many(blocks: Sequence[Block], max_jobs: int) -> Problem | None:
     """Return the problem of more jobs than may be made."""
     total = sum(block.combinations for block in blocks)
     if total <= max_jobs:
@@ -279,7 +279,7 @@ def _find_too_many(blocks: Sequence[Block], max_jobs: int) -> FileProblem | None
     key = max(largest.factors, key=largest.size)[0]
     many = Decimal(total)  # which may be beyond any float
     message = f"{many:.20g} jobs are more than {max_jobs}: ask for fewer, or raise --max-jobs"
-    return FileProblem(largest.tree.at(*largest.sweeps[key].path)[1], key, message)
+    return Problem(key, message, largest.tree.at(*largest.sweeps[key].path)[1])
 
 
 def _columns(blocks: Sequence[Block]) -> list[str]:
@@ -330,7 +330,7 @@ def _check_cases(
     problems = [*itertools.islice(wrong.values(), MAX_CONFLICTS)]
     if len(wrong) > MAX_CONFLICTS:
         message = f"{len(wrong)} conflicts between swept values; the first {MAX_CONFLICTS} are"
-        problems.append(FileProblem(Place(file.path), "", message))
+        problems.append(Problem("", message, Place(file.path)))
     if problems:
         raise CaseFileError(problems)
     return tuple(keys), values, selected
@@ -353,7 +353,7 @@ def axis_value(case: Case, given: Mapping[str, Any], key: str) -> Any:
 Where = tuple[Place, str]  # a key of a file, which may be given for several blocks or files
 
 
-def _find_problems(paths: Sequence[str | os.PathLike[str]], max_jobs: int) -> list[FileProblem]:
+def _find_problems(paths: Sequence[str | os.PathLike[str]], max_jobs: int) -> list[Problem]:
     """Return what is wrong with files without the command line."""
     try:
         load_studies(*paths, max_jobs=max_jobs)
@@ -362,13 +362,13 @@ def _find_problems(paths: Sequence[str | os.PathLike[str]], max_jobs: int) -> li
     return []
 
 
-def _find_unread(blocks: Sequence[Block]) -> dict[Where, FileProblem]:
+def _find_unread(blocks: Sequence[Block]) -> dict[Where, Problem]:
     """Return the keys that no job reads of those that they are given for.
 
     Cases are built only until each key has a reader.
     """
     read: set[Where] = set()
-    unread: dict[Where, FileProblem] = {}
+    unread: dict[Where, Problem] = {}
     for block in blocks:
         tree, wanted = block.tree, {}
         for key, value in block.given.items():
@@ -390,7 +390,7 @@ def _find_unread(blocks: Sequence[Block]) -> dict[Where, FileProblem]:
                     problem = problem_of(*unmet)
                     at = tree.at(*path_of(problem.key))[0]
                     place = at if at.file == where[0].file else where[0]
-                    unread[where] = FileProblem(place, problem.key, problem.message)
+                    unread[where] = replace(problem, place=place)
             if not wanted:
                 break
     return {where: problem for where, problem in unread.items() if where not in read}

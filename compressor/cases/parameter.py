@@ -28,7 +28,7 @@ from pydantic import (
 )
 
 from compressor.cases.card import ATMOSPHERE_MPA, IN_MPA, CardError, mark_card
-from compressor.cases.yaml_reader import is_number
+from compressor.cases.yaml_reader import Problem, is_number
 from compressor.metrics import METRICS
 from compressor.program import MAX_WORD_LENGTH, CompsimError, did_you_mean
 
@@ -142,17 +142,6 @@ PINS = {
     "crank_pin": "big_end", "crosshead_pin": "small_end", "wrist_pin": "small_end",
     "gudgeon_pin": "small_end",
 }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Problem:
-    """What is wrong with one key of a case."""
-
-    key: str
-    message: str
-
-    def __str__(self) -> str:
-        return f"{self.key}: {self.message}" if self.key else self.message
 
 
 class CaseError(CompsimError, ValueError):

@@ -33,10 +33,10 @@ from compressor.cases.keys import drop, path_of, put
 from compressor.cases.parameter import CaseError, integer, make_group, quote_value
 from compressor.cases.swept import FORMS, NoSweep, Sweep, design, design_size, sweep_of
 from compressor.cases.table import outside_identity
-from compressor.cases.yaml_reader import FileProblem, Place, Tree
+from compressor.cases.yaml_reader import Place, Problem, Tree
 
 Factors = list[tuple[str, ...]]  # keys that advance together
-Located = dict[tuple[Place, str], FileProblem]  # by the place and the key that a problem is about
+Located = dict[tuple[Place, str], Problem]  # by the place and the key that a problem is about
 
 
 @dataclass(frozen=True)
@@ -178,10 +178,10 @@ class Block:
             else:
                 is_value = tuple(parts) in self.tree.places and not is_of_key(message)
                 place = self.tree.at(*parts)[is_value]
-            found.setdefault((place, key), FileProblem(place, key, message))
+            found.setdefault((place, key), Problem(key, message, place))
         return found
 
-    def find_repeated(self) -> Iterator[FileProblem]:
+    def find_repeated(self) -> Iterator[Problem]:
         """Yield the values that stand twice in the lists of keys."""
         for keys in self.factors:
             sweep = self.sweeps[keys[0]]
@@ -191,7 +191,7 @@ class Block:
                 if (text := repr(values)) in seen and sweep.kind == "list":
                     place = self.tree.at(*sweep.path, number)[1]
                     message = f"{', '.join(map(quote_value, values))} is in the list twice"
-                    yield FileProblem(place, " with ".join(keys), message)
+                    yield Problem(" with ".join(keys), message, place)
                 seen.add(text)
 
 
@@ -224,7 +224,7 @@ def reader(given: Mapping[str, Any], case: Callable[[], Case | None]) -> Callabl
     return value
 
 
-def plan_block(tree: Tree, name: str) -> tuple[Block, list[FileProblem]]:
+def plan_block(tree: Tree, name: str) -> tuple[Block, list[Problem]]:
     """Return a block whose values are yet to be made, and what is wrong with how they are swept.
 
     name: of the study.
@@ -239,7 +239,7 @@ def plan_block(tree: Tree, name: str) -> tuple[Block, list[FileProblem]]:
         other = names.setdefault(key, key_of(path))
         if other != key_of(path) and (key in sweeps or is_swept(key, value)):
             told = f"{other} is given, too: give one of the two"
-            problems.append(FileProblem(tree.at(*path)[0], key_of(path), told))
+            problems.append(Problem(key_of(path), told, tree.at(*path)[0]))
         given[key] = value
         if not is_swept(key, value):
             own = hold_value(key, value) if key == key_of(path) else value
@@ -248,7 +248,7 @@ def plan_block(tree: Tree, name: str) -> tuple[Block, list[FileProblem]]:
         try:
             sweeps[key] = _sweep(path, key, value)
         except NoSweep as error:
-            problems.append(FileProblem(tree.at(*path, *error.path)[1], key, str(error)))
+            problems.append(Problem(key, str(error), tree.at(*path, *error.path)[1]))
     sample, wrong_design = _design_of(tree, sweeps)
     groups, wrong_zip = _zip_groups(tree, sweeps, {problem.key for problem in problems})
     exclusions, wrong_tests = _exclusions(tree)
@@ -292,7 +292,7 @@ class Sample:
     seed: int = integer(0, "[0, 1e18]", "seed of a design")
 
 
-def _design_of(tree: Tree, sweeps: dict[str, Sweep]) -> tuple[Sample, list[FileProblem]]:
+def _design_of(tree: Tree, sweeps: dict[str, Sweep]) -> tuple[Sample, list[Problem]]:
     """Return how many samples from which seed a block draws, and what is wrong with that."""
     drawn = [sweep for sweep in sweeps.values() if sweep.is_drawn]
     sample, problems = read_own(Sample, "sample", tree)
@@ -310,7 +310,7 @@ def _design_of(tree: Tree, sweeps: dict[str, Sweep]) -> tuple[Sample, list[FileP
     return Sample() if problems else sample, problems
 
 
-def read_own(of: type[Any], name: str, tree: Tree) -> tuple[Any, list[FileProblem]]:
+def read_own(of: type[Any], name: str, tree: Tree) -> tuple[Any, list[Problem]]:
     """Return a group of a file that is no part of a case, and what is wrong with it."""
     values = tree.values.get(name, {})
     if not isinstance(values, dict):
@@ -326,7 +326,7 @@ def read_own(of: type[Any], name: str, tree: Tree) -> tuple[Any, list[FileProble
 
 def _zip_groups(
     tree: Tree, sweeps: dict[str, Sweep], wrong: set[str]
-) -> tuple[Factors, list[FileProblem]]:
+) -> tuple[Factors, list[Problem]]:
     """Return the groups of `zip`, swept keys with equally many values, and what is wrong with them.
 
     wrong: keys whose sweep is wrong, which is reported already.
@@ -339,7 +339,7 @@ def _zip_groups(
         if not message:
             found.append(tuple(sorted(keys, key=[*sweeps].index)))
         elif not (isinstance(keys, list) and wrong.intersection(map(str, keys))):
-            problems.append(FileProblem(tree.at("zip", number)[1], "zip", message))
+            problems.append(Problem("zip", message, tree.at("zip", number)[1]))
     return found, problems
 
 
@@ -362,7 +362,7 @@ def _tell_zip(sweeps: dict[str, Sweep], keys: Any, taken: Sequence[str]) -> str:
     return ""
 
 
-def _exclusions(tree: Tree) -> tuple[list[Test], list[FileProblem]]:
+def _exclusions(tree: Tree) -> tuple[list[Test], list[Problem]]:
     """Return the comparisons of `exclude`; where one holds, a combination is left out."""
     value = tree.values.get("exclude", [])
     texts = value if isinstance(value, list) else [value]
@@ -371,7 +371,7 @@ def _exclusions(tree: Tree) -> tuple[list[Test], list[FileProblem]]:
         try:
             tests.append(comparison(text))
         except NoComparison as error:
-            problems.append(FileProblem(tree.at("exclude", number)[1], "exclude", str(error)))
+            problems.append(Problem("exclude", str(error), tree.at("exclude", number)[1]))
     return tests, problems
 
 

@@ -10,6 +10,7 @@ import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import yaml
@@ -46,13 +47,13 @@ class Place:
         return f"{name}:{self.line}:{self.column}" if self.line else name
 
 
-@dataclass(frozen=True, order=True)
-class FileProblem:
-    """What is wrong with one key of a case file, and where; the key may be empty."""
+@dataclass(frozen=True)
+class Problem:
+    """What is wrong with one key of a case, and where in a file; key and place may be empty."""
 
-    place: Place
     key: str
     message: str
+    place: Place = Place("")
 
     def __str__(self) -> str:
         parts = (str(self.place), shorten(printable(self.key)), printable(self.message))
@@ -75,12 +76,12 @@ class Tree:
             path = path[:-1]
         return self.places[path]
 
-    def problem(self, path: Path, message: str, of_key: bool = False) -> FileProblem:
+    def problem(self, path: Path, message: str, of_key: bool = False) -> Problem:
         """Return what is wrong with the value at a path, or with its key."""
-        return FileProblem(self.at(*path)[not of_key], ".".join(map(str, path)), message)
+        return Problem(".".join(map(str, path)), message, self.at(*path)[not of_key])
 
 
-Read = tuple[Tree | None, list[FileProblem]]  # None where nothing could be read
+Read = tuple[Tree | None, list[Problem]]  # None where nothing could be read
 
 
 def shorten(text: str, most: int = 60) -> str:
@@ -98,14 +99,14 @@ def read_file(path: str) -> Read:
         hint = f"; {START}" * isinstance(error, FileNotFoundError)
         if isinstance(error, IsADirectoryError):
             hint = f"; give the files in it, compsim run {shlex.quote(path.rstrip('/'))}/*.yaml"
-        return None, [FileProblem(Place(path), "", message + hint)]
+        return None, [Problem("", message + hint, Place(path))]
     if len(data) > MAX_BYTES:
-        return None, [FileProblem(Place(path), "", "is larger than 1 MiB: no case file")]
+        return None, [Problem("", "is larger than 1 MiB: no case file", Place(path))]
     try:
         text = data.decode().removeprefix("\ufeff")
     except UnicodeDecodeError as error:
         place = _place_after(path, data[: error.start].decode())
-        return None, [FileProblem(place, "", "is not UTF-8 text; a case file is YAML")]
+        return None, [Problem("", "is not UTF-8 text; a case file is YAML", place)]
     return read_text(text, Place(path, 1, 1))
 
 
@@ -123,13 +124,13 @@ def read_text(text: str, start: Place) -> Read:
     except yaml.reader.ReaderError as error:
         place = _place_after(start.file, text[: error.position]) if start.line else start
         told = f"must not hold the character U+{ord(text[error.position]):04X}"
-        return None, [FileProblem(place, "", told)]
+        return None, [Problem("", told, place)]
     except (ValueError, OverflowError, RecursionError) as error:  # PyYAML on "\UFFFFFFFF"
         deep = isinstance(error, RecursionError)
         told = "is nested too deeply" if deep else "is no YAML: a number is too large here"
-        return None, [FileProblem(start, "", told)]
+        return None, [Problem("", told, start)]
     if root is None:
-        return None, [FileProblem(start, "", f"is empty{f'; {START}' if start.line else ''}")]
+        return None, [Problem("", f"is empty{f'; {START}' if start.line else ''}", start)]
     return Tree(values, reader.places), reader.problems
 
 
@@ -153,7 +154,7 @@ class _Reader:
     def __init__(self, start: Place):
         self.start = start
         self.places: dict[Path, tuple[Place, Place]] = {}
-        self.problems: list[FileProblem] = []
+        self.problems: list[Problem] = []
 
     def place(self, node: Any) -> Place:
         """Return where a node stands."""
@@ -163,7 +164,7 @@ class _Reader:
     def note(self, node: Any, path: Path, message: str) -> None:
         """Note what is wrong with a node."""
         key = ".".join(str(name) for name in path if isinstance(name, str))
-        self.problems.append(FileProblem(self.place(node), key, message))
+        self.problems.append(Problem(key, message, self.place(node)))
 
     def plain(self, node: Any, path: Path, key_place: Place) -> Any:
         """Return the value of a node, and keep where it stands."""
@@ -206,20 +207,20 @@ class _Reader:
         return found
 
 
-def _tell_syntax(text: str, error: yaml.MarkedYAMLError, start: Place) -> FileProblem:
+def _tell_syntax(text: str, error: yaml.MarkedYAMLError, start: Place) -> Problem:
     """Return what is wrong with the syntax of a text; a beginner's slip at its own line."""
     mark, told = error.problem_mark or error.context_mark, str(error.problem)
     line, column = (mark.line, mark.column) if mark else (0, 0)
     place = Place(start.file, line + 1, column + 1) if start.line and mark else start
     if isinstance(error, ConstructorError):  # YAML, but no case file's
-        return FileProblem(place, "", told)
+        return Problem("", told, place)
     if told == "but found another document":
-        return FileProblem(place, "", "a second document begins here; a case file holds one")
+        return Problem("", "a second document begins here; a case file holds one", place)
     if "'\\t'" in told:
-        return FileProblem(place, "", f"is no YAML: {told}; indent with spaces, not tabs")
+        return Problem("", f"is no YAML: {told}; indent with spaces, not tabs", place)
     if mark and start.line and (slip := find_slip(text, line)):
-        return FileProblem(Place(start.file, slip[0] + 1, 1), "", slip[1])
-    return FileProblem(place, "", f"is no YAML: {shorten(told, 120)}")
+        return Problem("", slip[1], Place(start.file, slip[0] + 1, 1))
+    return Problem("", f"is no YAML: {shorten(told, 120)}", place)
 
 
 def find_slip(text: str, last: int) -> tuple[int, str] | None:
@@ -292,8 +293,8 @@ class CaseFileError(CompsimError, ValueError):
     exit_code = 2
     prefix = ""  # each line begins with the file that it is about
 
-    def __init__(self, problems: Sequence[FileProblem]):
-        self.problems = sorted(set(problems))
+    def __init__(self, problems: Sequence[Problem]):
+        self.problems = sorted(set(problems), key=attrgetter("place", "key", "message"))
         super().__init__(self.problems)
 
     def __str__(self) -> str:

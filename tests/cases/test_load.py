@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_cases, load_studies
-from compressor.cases.yaml_reader import MAX_BYTES, FileProblem, resolve_scalar
+from compressor.cases.yaml_reader import MAX_BYTES, Problem, resolve_scalar
 
 BIG_END = "joint: big_end\nclearance_mm: 0.1\n"
 one_file = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=3000)
@@ -196,7 +196,7 @@ SWEEPS = [
 SWEPT = st.lists(st.sampled_from(SWEEPS), max_size=6, unique=True).map("\n".join)
 
 
-def problems(path: str, *overrides: str) -> list[FileProblem]:
+def problems(path: str, *overrides: str) -> list[Problem]:
     try:
         (study,) = load_studies(path, overrides=overrides)
     except CaseFileError as error:
