@@ -70,7 +70,8 @@ class ProgressReporter:
             screen.say(self.words())
         if error and self.folder and self.total:
             total = plural(self.total, self.things.removesuffix("s"))
-            stored = f"{self.done} of {total} {'is' if self.total == 1 else 'are'} stored"
+            # at least: a worker may just have stored more
+            stored = f"at least {self.done} of {total} {'is' if self.total == 1 else 'are'} stored"
             screen.say(f"{stored} in {self.folder}; the same command goes on from there")
 
     def __call__(self, done: int, total: int, remark: str) -> None:

@@ -6,6 +6,7 @@ that are twice one of ours, and other units that are answered.
 """
 
 import dataclasses
+import math
 import operator
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -123,7 +124,7 @@ DIAMETERS = (
     (r"(?<!con)(?<!con_)(?<!connecting_)rod", "gas.rod_diameter_mm: {whole}, the piston rod's"),
     (r"piston|cylinder|bore|^dia", "gas.bore_mm: {whole}"),
 )
-DIAMETER = re.compile(r"(?i)(\w*_)?(diameter|diametral|dia)(_\w*)?")
+DIAMETER = re.compile(r"(?i)(\w*_)?(diameter|diametral|dia)(_\w*)?|piston_rod(_mm)?")
 BACK_AND_FORTH = re.compile(
     r"(\w*_)?(piston|crosshead|plunger|reciprocating|wrist_?pin|gudgeon_?pin)(_\w*)?_mass(_[a-z]+)?"
 )
@@ -179,10 +180,17 @@ def of_other_quantity(name: str, group: str, value: Any) -> str:
     for words, form in DIAMETERS if DIAMETER.fullmatch(name) else ():
         if re.search(words, name) and (is_near or "pin_radius" in form):
             ours, factor = OTHER_UNITS.get(name.rpartition("_")[2], ("mm", 1.0))
-            known = is_number(value) and ours == "mm"
-            half, whole = (f"{value * factor / n:.12g}" if known else "..." for n in (2, 1))
+            factor = factor if ours == "mm" else math.nan
+            half, whole = (_scaled(value, factor / n) for n in (2, 1))
             return "; write " + form.format(half=half, whole=whole)
     return ""
+
+
+def _scaled(value: Any, factor: float) -> str:
+    """Return a number, or one of each part, times a factor as a file has it; `...` if it cannot."""
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{part}: {_scaled(one, factor)}' for part, one in value.items())}}}"
+    return f"{value * factor:.12g}" if is_number(value) and math.isfinite(factor) else "..."
 
 
 # keys of a case file that are no part of a case: how values are swept together, what the page of

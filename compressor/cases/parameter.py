@@ -481,7 +481,8 @@ def _problem_of_parts(key: str, value: Any, parts: Mapping[str, Parameter], caus
         hint = did_you_mean(name, parts, {part: f"{key}.{part}" for part in parts})
         return Problem(f"{key}.{name}", f"unknown key; {hint or known}")
     needed = f"needs both, {' and '.join(parts)}, not {', '.join(value) or 'none'}"
-    return Problem(key, f"{needed}; or one number for both")
+    one = "pair" if next(iter(parts.values())).kind == "materials" else "number"
+    return Problem(key, f"{needed}; or one {one} for both")
 
 
 def _value_under(value: Any, name: str) -> Any:

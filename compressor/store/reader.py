@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from compressor.store.files import Folder, StoreWarning
 from compressor.store.stored import Stored, read_store
-from compressor.store.studies import StoredStudy, find_study, read_studies
+from compressor.store.studies import StoredStudy, find_study, read_studies, whole_key
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,7 +21,8 @@ def read_job(folder: Folder, key: str) -> "xr.Dataset":
     """Return a stored job's Dataset: what `simulate` gives of its case, with series if stored.
 
     folder: of results; key: 20 hexadecimal digits, as `Case.key` and the coordinate `key` of a
-    study have them. Raises StoreError where there is no such job, or a damaged one.
+    study have them, or the beginning of one. Raises StoreError where there is no such job, or a
+    damaged one.
 
     After `compsim run wear.yaml` with the file of `load_cases`:
 
@@ -31,7 +32,10 @@ def read_job(folder: Folder, key: str) -> "xr.Dataset":
     >>> run.acceleration.dims, compressor.Case.from_attribute(run.attrs["case"]).joint
     (('time',), 'big_end')
     """
-    return read_store(folder).job(key)
+    stored = read_store(folder)
+    if stored.position(key) is None:
+        key = whole_key(folder, key, read_studies(folder), stored.keys())
+    return stored.job(key)
 
 
 def open_study(folder: Folder, name: str | None = None) -> "xr.Dataset":

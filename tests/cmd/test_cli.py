@@ -268,7 +268,7 @@ def test_a_run_that_is_told_to_end(tmp_path):
     goes_on = f"of {JOBS} jobs are stored in results; the same command goes on from there"
     slow = rf"(compil.+\n(  .+\n)*|\d+ of {JOBS} jobs, .+\n)*"  # told where it takes long
     machine = r"many: its machine, .+\n(  .+\n)+"
-    assert re.fullmatch(rf"{machine}{slow}\d+ {goes_on}\ninterrupted by SIGINT\n", err)
+    assert re.fullmatch(rf"{machine}{slow}at least \d+ {goes_on}\ninterrupted by SIGINT\n", err)
 
 
 def test_a_run_says_what_the_file_means_and_what_is_odd_about_it(case_file, compsim):

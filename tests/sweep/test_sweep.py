@@ -90,7 +90,7 @@ def test_damaged_numbers_are_mended_with_series_as_exact_as_they_were(
         flip(path, job.peak_acceleration.values)
         assert sweep(made, tmp_path / "out", 1).run_now == 1
         assert sweep(made, tmp_path / "out", 1).run_now == 0
-        again = store.read_job(tmp_path / "out", made[0].cases[0].key)
+        again = store.read_job(tmp_path / "out", made[0].cases[0].key[:10])
         assert again.acceleration.identical(job.acceleration)
         assert verify(tmp_path / "out") == []
 
