@@ -45,6 +45,7 @@ LIBRARIES = {  # library -> the modules that may import it
     for libraries, places in read_table("library")
     for library in quoted(libraries)
 }
+MAX_NAMES = 10  # of ours that a study imports
 OF_PHYSICS = {
     "numpy", "math", "enum", "typing", "types", "dataclasses", "collections", "functools",
     "compressor",
@@ -169,6 +170,14 @@ def test_the_house_keeps_its_rules():
 def test_a_planted_fault_breaks_a_rule(module, planted):
     text = f"{SOURCES[module]}\n{planted}\n"
     assert [*faults(module, text)] or circles(SOURCES | {module: text})
+
+
+def test_a_study_imports_few_names():
+    own = {
+        module: {name or source for source, name in imports(text) if source.startswith("comp")}
+        for module, text in SOURCES.items() if room(module) == "studies"
+    }  # fmt: skip
+    assert {module: names for module, names in own.items() if len(names) > MAX_NAMES} == {}
 
 
 def test_every_package_is_installed():

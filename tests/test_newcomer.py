@@ -1,4 +1,4 @@
-"""Recipes of compressor/README.md, followed literally in one copy of the program."""
+"""The recipes of compressor/README.md, followed literally in one copy of the program."""
 
 import os
 import re
@@ -11,7 +11,10 @@ from pathlib import Path
 import pytest
 from conftest import part_of
 
+from compressor.physics.contact_laws import Law
+
 ROOT = Path(__file__).parents[1]
+LAWS = "compressor/physics/contact_laws.py"
 
 
 def blocks(begin, end):
@@ -22,30 +25,68 @@ def blocks(begin, end):
     return [textwrap.dedent(text).removeprefix("```py\n").removesuffix("```") for text in found]
 
 
-def put(path, place, new):
-    """Put a text into a file, behind its one place."""
+def indented(text):
+    return textwrap.indent(text, "    ")
+
+
+def put(copy, name, *edits):
+    """Put texts into a file of the copy: each behind its one place, or at the end if that is ""."""
+    path = copy / name
     text = path.read_text(encoding="utf-8")
-    assert text.count(place) == 1, f"{path}: {place!r}"
-    path.write_text(text.replace(place, place + new), encoding="utf-8")
+    for place, new in edits:
+        assert not place or text.count(place) == 1, f"{name}: {place!r}"
+        text = text.replace(place, place + new) if place else f"{text}\n\n{new}"
+    path.write_text(text, encoding="utf-8")
 
 
 def put_verb(copy, name, module, line):
     """Add a verb by its module and its line in the table of verbs."""
     (copy / f"cmd/compsim/{name}.py").write_text(module, encoding="utf-8")
-    put(copy / "cmd/compsim/cli.py", '"Read what is stored": (', f"{line.strip()} ")
+    put(copy, "cmd/compsim/cli.py", ('"Read what is stored": (', f"{line.strip()} "))
+
+
+def put_laws(copy):
+    """Add the law that damps by a restitution, and the one with a force of its own."""
+    member, damping, words, given, force, choice = blocks(
+        "a contact law", "a feature of the mechanism"
+    )
+    source = (ROOT / LAWS).read_text(encoding="utf-8")
+    _, *branches = re.split(r"^# (\w+)[^\n]*\n", choice, flags=re.MULTILINE)
+    heads = [
+        re.search(rf'def {name}\(.*?""".*?"""\n', source, re.DOTALL).group()
+        for name in branches[::2]
+    ]
+    put(
+        copy, LAWS,
+        (f"    LIU = {int(Law.LIU)}\n", indented(f"{member}LINEAR = {Law.LIU + 2}\n")),
+        ("    Law.LIU: lambda e: 0.75 * (1.0 - e**2),\n", indented(damping)),
+        *zip(heads, map(indented, branches[1::2]), strict=True),
+        ("", f"LINEAR = int(Law.LINEAR)\n\n\n{force}"),
+    )  # fmt: skip
+    put(
+        copy, "compressor/cases/laws.py",
+        ("RESTITUTING = (", f"{words.strip()} "),
+        ('CONTACT_LAWS = ("impact", ', '"linear", '),
+        ('"damping_N_s_per_mm": ("impact",', ' "linear"'),
+    )  # fmt: skip
+    put(copy, "tests/published.py", ("GIVEN = {\n", indented(given)))
 
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory):
-    """A copy with two metrics, a figure, two verbs and a study more."""
+    """A copy with two laws, two metrics, a figure, two verbs and a study more."""
     place = tmp_path_factory.mktemp("copy")
-    for folder in ("compressor", "cmd"):
+    for folder in ("compressor", "cmd", "tests"):
         shutil.copytree(ROOT / folder, place / folder,
-                        ignore=shutil.ignore_patterns("*.pyc.*"))  # fmt: skip
-    rows = textwrap.indent("".join(blocks("a metric", "a figure")), "    ")
-    put(place / "compressor/metrics.py", "TABLE = (\n", rows)
-    with open(place / "compressor/report/figures/paper.py", "a", encoding="utf-8") as figures:
-        print("\n", *blocks("a figure", "a verb"), sep="\n", file=figures)
+                        ignore=shutil.ignore_patterns("results", "*.pyc.*"))  # fmt: skip
+    shutil.copyfile(ROOT / "pyproject.toml", place / "pyproject.toml")
+    put_laws(place)
+    put(
+        place,
+        "compressor/metrics.py",
+        ("TABLE = (\n", indented("".join(blocks("a metric", "a figure")))),
+    )
+    put(place, "compressor/report/figures/paper.py", ("", *blocks("a figure", "a verb")))
     put_verb(place, "size", *blocks("a verb", "a study"))
     module, *verb = blocks("a study", "a public name")
     (place / "compressor/studies/count.py").write_text(module, encoding="utf-8")
@@ -112,3 +153,21 @@ def test_a_new_figure_is_in_the_report_and_new_verbs_run(copy, paper_store):
     assert run_in(copy, "-m", "compsim", "size", "-r", "some") == "4\n"
     assert run_in(copy, "-m", "compsim", "count", "big-end") == "periodic 3\n"
     assert "Print how many jobs of a study" in run_in(copy, "-m", "compsim", "--help")
+
+
+PASS = (
+    "test_every_choice_of_a_case_file_is_compiled[contact.law-Law]",
+    "test_the_energy_is_the_work_of_the_elastic_force[1.5-herbert_mcwhannell]",
+    "test_the_energy_is_the_work_of_the_elastic_force[1.5-linear]",
+    "test_the_force_is_elastic_and_damped_and_never_pulls[linear]",
+    "test_a_drop_through_the_whole_solver_gives_it_back[herbert_mcwhannell-0.5-0.5936]",
+)
+
+
+def test_new_contact_laws_pass_the_tests_of_all_laws(copy):
+    tests = ("tests/physics/test_contact_laws.py", "tests/physics/test_restitution.py")
+    which = "contact_laws or herbert_mcwhannell-0.5"
+    options = ("-vv", "-p", "no:cacheprovider", "-p", "no:xdist", "-k", which)
+    told = run_in(copy, "-m", "pytest", *options, *tests)
+    for name in PASS:
+        assert re.search(rf"::{re.escape(name)} PASSED", told), name

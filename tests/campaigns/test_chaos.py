@@ -1,4 +1,4 @@
-"""`make chaos`: a full disk, and what would be seen if it happened."""
+"""`make chaos`: a sample of full disks and power cuts, and what would be seen."""
 
 import faulthandler
 import os
@@ -6,11 +6,14 @@ import time
 
 import measure_chaos
 import pytest
-from chaos import common
+from chaos import common, power
 
 
-def test_nothing_fails_in_a_sample():
-    found = measure_chaos.run("faults", 1)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["faults", "power"])
+def test_nothing_fails_in_a_sample(name, monkeypatch):
+    monkeypatch.setattr(power, "JOBS", {"metrics": 200, "series": 3})
+    found = measure_chaos.run(name, 1)
     if "skipped" in found:
         pytest.skip(found["skipped"])
     assert found["failures"] == []
