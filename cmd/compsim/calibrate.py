@@ -35,15 +35,17 @@ def calibrate(record, config, ranges, hints, overrides, folder, jobs, as_json, q
     Each point is a stored job of the study CONFIG-calibrate. Exit code 0 also if the machine does
     not fit: that is an answer.
     """
-    from compressor.cases import to_yaml
+    from compressor.cases import load_studies, to_yaml
     from compressor.store import find_record
     from compressor.studies.calibrate import calibrate as fit_case
     from compressor.studies.calibrate import jsonable_fit, list_fit
-    from compressor.studies.frame import read_range
+    from compressor.studies.frame import read_range, replace_settings
     from compressor.sweep import cores
 
     unknowns = [read_range("--fit", text) for text in ranges]
     _, measured = find_record(record, folder, hints)
+    middle = replace_settings(overrides, *(f"{one.key}={one.value(0.5)!r}" for one in unknowns))
+    screen.caution(load_studies(config, overrides=middle))
     with ProgressReporter(quiet, "points") as progress:
         found = fit_case(measured, config, unknowns, folder, overrides, jobs or cores(), progress)
     if as_json:

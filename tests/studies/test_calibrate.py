@@ -194,6 +194,7 @@ def test_a_case_without_a_sensor_and_the_speed_are_refused(fitted, monkeypatch, 
     err = compsim(*words, "--fit", "machine.speed_rpm=400:500", code=2).err
     assert "machine.speed_rpm is the record's own" in err
     err = compsim(*words, "--set", "sensor.low_pass_Hz=1", code=2).err
+    assert "warning: body.casing_mass_kg: 18 kg is the default" in err  # as a run has it
     assert "its sensor's band holds no order of" in err
     Path("bare.yaml").write_text('{"load": "gas", "gas": {"switching": "exact"}}')
     again = ["bare.yaml" if word == "machine.yaml" else word for word in words]

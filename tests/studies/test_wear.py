@@ -62,6 +62,16 @@ def test_a_line_for_each_machine_says_when_it_is_worn_out(told, compsim):
     assert figure.stat().st_size > 10_000
 
 
+def test_warnings_are_those_of_a_run(tmp_path, compsim, monkeypatch):
+    """But for the one that a run leaves wear out."""
+    file = tmp_path / "pins.yaml"
+    file.write_text(TEXT.replace("[400, 500]", "400, pin_radius_mm: 30"), encoding="utf-8")
+    monkeypatch.setattr(wear, "run_wear", lambda *_: ([], 0))
+    said = " ".join(compsim("wear", file, "-r", tmp_path).err.split())
+    assert "wear.bore_length_mm: 20 mm is the default, for the paper's pin of 10 mm" in said
+    assert "compsim wear alone reads it" not in said
+
+
 @pytest.mark.slow
 def test_a_killed_machine_goes_on_and_ends_in_the_same_bits(told, tmp_path):
     """SIGKILL at random, until all stages are there."""
