@@ -31,6 +31,8 @@ SAME_BAND = 0.5  # dB, to which a third octave of a job is taken as known
 UNSAID = {"joint", "clearance_mm", "sensor"}  # swept groups that are told otherwise, or not
 MAX_LISTED = 20  # jobs
 NEAR = 0.25  # share by which a ratio may differ from one between two units
+NEAR_IF_ALL = 2.0  # times, where all jobs' ratios are nearer to that one than to 1
+SAME_SPEED = 0.05  # share by which speeds may differ
 MISTAKES = {  # ratio of rms -> what was probably mistaken
     9.80665: "m/s2 were perhaps read as g", 1 / 9.80665: "g were perhaps read as m/s2",
     1000.0: "mm/s2 were perhaps read as m/s2", 1e-3: "m/s2 were perhaps read as mm/s2",
@@ -231,7 +233,7 @@ class Compared:
 class Comparison:
     """A record beside jobs, the most alike first.
 
-    remarks: how a file was read, and which unit it was perhaps written in; orders: the highest that
+    remarks: how a file was read, and what was perhaps mistaken; orders: the highest that
     the record holds; left_out: jobs without a record that can be used.
     """
 
@@ -283,13 +285,28 @@ def compare_record(
         text = f"none of the {len(wanted)} jobs has a sensor's record of two revolutions"
         raise frame.StudyError(f"{text}: run them with body: true, sensor: true and series kept")
     jobs.sort(key=lambda job: np.nan_to_num(job.likeness["difference"].value, nan=math.inf))
-    ratio = jobs[0].likeness["rms_ratio"].value
-    unit = [f"the rms is {ratio:.3g} times the job's: {text}; check --unit"
-            for size, text in MISTAKES.items() if abs(ratio / size - 1.0) <= NEAR]  # fmt: skip
+    remarks = (*record.remarks, *doubts(mine.rpm, jobs))
     return Comparison(
-        name, (*record.remarks, *unit), mine, own[mine.highest], mine.highest, tuple(jobs),
+        name, remarks, mine, own[mine.highest], mine.highest, tuple(jobs),
         len(wanted) - len(jobs),
     )  # fmt: skip
+
+
+def doubts(rpm: float, jobs: Sequence[Compared]) -> Iterator[str]:
+    """Yield what was perhaps mistaken of a record: its unit, its speed; jobs: most alike first."""
+    ratios = np.array([job.likeness["rms_ratio"].value for job in jobs])
+    for size, text in MISTAKES.items():
+        is_near = abs(ratios[0] / size - 1.0) <= NEAR
+        away = np.abs(np.log(ratios / size))
+        all_nearer = bool((away < np.abs(np.log(ratios))).all())
+        if is_near or (all_nearer and away[0] <= math.log(NEAR_IF_ALL)):
+            yield f"the rms is {ratios[0]:.3g} times the job's: {text}; check --unit"
+    nearest = min((job.rpm for job in jobs), key=lambda one: abs(one - rpm))
+    if abs(rpm / nearest - 1.0) > SAME_SPEED:
+        yield (
+            f"it turns at {rpm:.4g} rpm, and the nearest job at {nearest:.4g} rpm: check the "
+            "tacho, --rpm and --time-unit"
+        )
 
 
 def check_orders(orders: int, what: str) -> None:

@@ -53,7 +53,7 @@ def export(folder, compsim):
     return path
 
 
-def test_a_unit_that_was_perhaps_mistaken_is_named(folder, compare, export):
+def test_a_unit_or_a_speed_that_was_perhaps_mistaken_is_named(folder, compare, export):
     record, path = read_record(export), folder[0] / "record.wav"
     tacho = record_columns(record.times, record.values, record.tacho)["tacho"]
     signals = np.stack([record.values, tacho], axis=1).astype(np.float32)
@@ -63,6 +63,12 @@ def test_a_unit_that_was_perhaps_mistaken_is_named(folder, compare, export):
         told = f"the rms is {times} times the job's: m/s2 were perhaps read as {unit}; check --unit"
         assert told in compare(path, folder[1], *words, unit)
     assert "perhaps" not in compare(path, folder[1], *words, "in/s2")
+    quieter = compare(path, folder[2]["no friction"], *words, "g")  # of 0.57 times the rms
+    assert "times the job's: m/s2 were perhaps read as g; check --unit" in quieter
+    faster = compare(path, folder[1], "--channel", "1", "--unit", "m/s2", "--rpm", "900",
+                     "--tdc", "0")  # fmt: skip
+    assert "it turns at 900 rpm, and the nearest job at 500 rpm: check the tacho, --rpm" in faster
+    assert "it turns" not in compare(path, folder[2]["520 rpm, not 500"], *words, "m/s2")
     (job,) = json.loads(compare(path, folder[1], *words, "m/s2", "--json"))["jobs"]
     assert job["rms_ratio"]["value"] == pytest.approx(1.0, rel=0.01)
 
