@@ -378,9 +378,10 @@ def body_rules(case: Case) -> Rules:
         if back > MAX_BACK_ACTION:
             yield (
                 f"body.{key}",
-                f"order {order} of the speed, {frequency:.3g} Hz, is so near that the body would "
-                f"change the force that drives it by {100 * back:.0f} %; move {key}, or give a "
-                "heavier body",
+                f"order {order} of the speed, {frequency:.3g} Hz at {case.machine.speed_rpm:.6g} "
+                "rpm, is so near that the body would change the force that drives it by "
+                f"{100 * back:.0f} %; move {key}, give a heavier body, or leave body and sensor "
+                "out",
             )
     # `auto` settles at a whole revolution, and measures whole ones from there on
     span = (case.duration - case.settle) / case.turn
