@@ -121,6 +121,13 @@ def comparison(text: str) -> Goal:
         raise frame.StudyError(f"{text!r}: {error}") from error
     if limit is None:
         raise frame.StudyError(f"{text!r} {NO_COMPARISON}")
+    is_share = goal.metric.endswith(("_fraction", "_share"))
+    greatest = 2.0 * math.pi if goal.unit == "rad" else 1.0 if is_share else math.inf
+    if abs(limit) > greatest:
+        raise frame.StudyError(
+            f"{text!r}: {limit:.4g} {goal.unit}".rstrip() + f" is more than {goal.metric} can be, "
+            f"{greatest:.3g}; a unit such as {'%' if is_share else 'deg'} goes behind the number"
+        )
     return replace(goal, limit=limit)
 
 

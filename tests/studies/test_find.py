@@ -45,6 +45,7 @@ def test_a_limit_may_have_a_unit():
     assert find.comparison("peak_contact_force.small_end > 166 kN").limit == 166e3
     assert find.comparison("peak_acceleration >= 2 g").limit == pytest.approx(19.6133)
     assert find.comparison("contact_loss_fraction.big_end < 5 %").limit == 0.05
+    assert find.comparison("rod_load_reversal_angle < 360 deg").limit == 2.0 * math.pi
 
 
 @pytest.mark.parametrize("threshold", [0.0001, 0.2, 0.3721, 0.5, 0.99])
@@ -204,6 +205,12 @@ def test_a_limit_without_a_bar_is_decided(sign, there):
         ("peak_acceleration > nan", "is no comparison"),
         ("1 < peak_acceleration < 2", "is no comparison"),
         ("peak_acceleration > 1.5 * base", "'* base' is no unit of it"),
+        (
+            "rod_load_reversal_angle < 160",
+            "160 rad is more than rod_load_reversal_angle can be, "
+            "6.28; a unit such as deg goes behind the number",
+        ),
+        ("contact_loss_fraction.big_end > 5", "can be, 1; a unit such as % goes behind the"),
         ("peak_acceleration > 2 kN", "'kN' is no unit of it; there are m/s2, m/s², g"),
     ],
 )
