@@ -10,6 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 from conftest import decoded
+from matplotlib import rc_context
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
@@ -206,6 +207,17 @@ def test_panels_that_share_decades_draw_them_alike():
     for axes in pictures.paint(drawing.figure()).axes:
         x, _ = axes.transData.transform([(1, 2), (10, 2), (100, 2)]).T
         assert x[1] - x[0] == pytest.approx(x[2] - x[1])
+
+
+@pytest.mark.parametrize("top", [39.238, 3e7, 3e-7])
+def test_ticks_are_whole_numbers(top):
+    """The offset +3.923e1 stood over a title."""
+    drawing, grid = make_grid(1, 1, 2.0)
+    grid[0, 0].plot([0, 1], [0.9999 * top, top], LineStyle("#000000"))
+    with rc_context(pictures.STYLE):
+        painted = pictures.paint(drawing.figure())
+        painted.draw_without_rendering()
+    assert painted.axes[0].yaxis.get_offset_text().get_text() == ""
 
 
 def test_two_processes_draw_what_one_does(figures, alone, two, monkeypatch, tmp_path, capfd):

@@ -47,6 +47,14 @@ def test_a_point_a_job_with_its_bar_and_key():
     assert rms.traces[0].error_y.array is None  # its bars of 0.01 % are not seen
 
 
+def test_noise_is_no_trend():
+    """An axis from 39.232 to 39.238 mm/s, in the bars' own middle, was a falling line."""
+    (drawn,) = draw_sweep(grid({"clearance_mm": CLEARANCES}, lambda c: 39.23 + 0.01 * c))
+    peak, rms = (np.ptp(panel.y.range) for panel in panels_of(drawn.figure))
+    assert peak == pytest.approx(6 * 0.392, rel=1e-3)  # of its bars of 1 %
+    assert rms == pytest.approx(0.01 * 19.617, rel=1e-3)  # of the value: its bars are shorter
+
+
 def test_failed_missing_and_chaotic_jobs_are_marked():
     status = ["ok", "failed", "missing", "ok"]
     regime = ["predictable", "", "", "chaotic"]

@@ -66,6 +66,8 @@ STYLE: Any = {
     "axes.spines.right": False,
     "axes.grid": True,
     "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,  # it would stand over the title; so would a power of ten
+    "axes.formatter.limits": (-99, 99),
     "grid.color": "#e3e3e3",
     "grid.linewidth": 0.6,
     "xtick.labelsize": 8.5,

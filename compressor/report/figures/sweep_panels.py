@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import plotly.graph_objects as go
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from compressor.report.figures import style
 from compressor.report.figures.drawing import Drawing, Panel, make_grid, thin_places
@@ -28,6 +29,7 @@ COLUMNS = 3
 MAX_LINES = 12  # in a panel
 MAX_KEYS = 2000  # jobs of a study that clicks show
 PANEL_MARGIN = 0.18  # of a panel's height, below and above its values
+MIN_SHARE, MIN_BARS = 0.01, 6.0  # least height: of the value, in error bars; else noise is a trend
 VISIBLE = 0.004  # of a panel's height: an error bar that is seen
 MARKERS = ("circle", "square", "diamond", "triangle-up", "triangle-down")
 CHAOTIC = "chaotic: a greatest value holds for this run only"
@@ -115,18 +117,20 @@ def in_lines(words: Sequence[str]) -> list[str]:
     return [word.replace(" ", "\n") for word in words]
 
 
-def scale_y(panel: Panel, values: np.ndarray) -> float:
+def scale_y(panel: Panel, values: np.ndarray, bars: ArrayLike = ()) -> float:
     """Set the y axis for values, with room at the foot for marks; return the panel's span.
 
-    Logarithmic over decades. Values that are all the same stand in the middle.
+    Logarithmic over decades. Values that differ by less than their error bars stand in the middle.
     """
-    values = values[np.isfinite(values)]
+    bars, values = np.asarray(bars), values[np.isfinite(values)]
+    bar = float(np.median(bars[np.isfinite(bars)])) if np.isfinite(bars).any() else 0.0
     low, high = (values.min(), values.max()) if values.size else (0.0, 1.0)
     if spans_decades(values):
         panel.y.type, room = "log", (high / low) ** PANEL_MARGIN
         panel.span("y", low / room, high * room)
         return float(low)
-    room = PANEL_MARGIN * (high - low) or 0.5 * abs(high) or 1.0
+    least = max(MIN_SHARE * max(abs(low), abs(high)), MIN_BARS * bar) or 1.0
+    room = max(PANEL_MARGIN * (high - low), 0.5 * (least - (high - low)))
     panel.span("y", low - room, high + room)
     return float(high - low + 2.0 * room)
 
@@ -169,7 +173,7 @@ def draw_curves(
     line = replace(PLAIN_LINE, linewidth=0.0) if axis.is_words else PLAIN_LINE
     for panel, measure in zip(drawing.panels, measures, strict=True):
         scale_x(panel, axis)
-        span = scale_y(panel, measure.of(sweep.data))
+        span = scale_y(panel, measure.of(sweep.data), measure.bar(sweep.data))
         plot_jobs(panel, sweep, measure, measure.title, line, span, listed=False)
         mark_feet(panel, axis.places, sweep.status, sweep.keys)
         for limit in limits.of(measure):
@@ -219,7 +223,7 @@ def draw_overview(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure])
                 values = means.isel({color.name: row}).values
                 panel.plot(axis.places, values, line, color.value_text(n))
             continue
-        span = scale_y(panel, measure.of(sweep.data))
+        span = scale_y(panel, measure.of(sweep.data), measure.bar(sweep.data))
         for n, part in parts.items():
             plot_jobs(panel, part, measure, color.value_text(n), lines[n], span)
         for part in parts.values():
@@ -258,7 +262,7 @@ def plot_points(panel: Panel, sweep: PlottedSweep, axis: int, measure: Measure) 
     one = sweep.axes[axis]
     x, y, keys = one.places, measure.of(sweep.data), sweep.keys
     scale_x(panel, one)
-    scale_y(panel, y)
+    scale_y(panel, y, measure.bar(sweep.data))
     phrase, words, group = grouping(sweep)
     shown = np.zeros(y.size, bool)
     shown[thin_places(y.size, MAX_POINTS)] = True
