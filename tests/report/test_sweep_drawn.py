@@ -14,12 +14,14 @@ from conftest import store_cases, without_pictures
 from swept_made import grid, listed
 
 from compressor.cases.swept import design
+from compressor.metrics import JOINTS
 from compressor.report.figures.drawing import as_csv, panels_of
 from compressor.report.figures.sweep import draw_sweep
-from compressor.report.figures.sweep_data import MEASURES, sweep_of
+from compressor.report.figures.sweep_data import MEASURES, axis_of, sweep_of
 from compressor.report.limits import MORE_IS_BETTER, LimitError, read_limits
 from compressor.report.page import measured_cell
 from compressor.store.reader import open_study
+from compressor.store.studies import coordinate_names, swept_column
 
 
 def plan(data, *limits):
@@ -295,6 +297,15 @@ def test_numbers_of_a_grid_are_sorted_and_words_are_not():
     assert sweep.keys.tolist() == [["k2", "k3"], ["k4", "k5"], ["k0", "k1"]]
     assert sweep.axes[0].title == "clearance (mm)"
     assert sweep.axes[0].value_text(1) == "clearance 0.2 mm"
+
+
+def test_both_joints_keys_have_one_form():
+    """A figure had "clearance, small end" beside "radial clearance of the big end"."""
+    keys = [f"clearance_mm.{joint}" for joint in JOINTS]
+    names = coordinate_names(keys)
+    columns = {names[key]: ("job", *swept_column(key, [0.1, 0.2])) for key in keys}
+    phrases = [axis_of(xr.Dataset(coords=columns), name).phrase for name in columns]
+    assert phrases == ["clearance, big end", "clearance, small end"]
 
 
 def test_a_list_of_jobs_is_no_grid_even_where_it_fills_one():

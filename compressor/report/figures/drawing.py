@@ -442,7 +442,8 @@ def as_csv(figure: go.Figure) -> str:
             if (x_title, x.tobytes()) != last:
                 columns.append((f"{where}: {x_title}", name_places(x, panel.x)))
                 last = x_title, x.tobytes()
-            columns.append((f"{where}: {y_title}", name_places(y, panel.y, figure.layout.meta)))
+            head = f"{where}: {y_title}".removesuffix(": ")
+            columns.append((head, name_places(y, panel.y, figure.layout.meta)))
             columns += [(f"{where}: {name}", texts(values)) for name, values in more]
             if jobs and jobs != last_jobs:
                 columns.append((f"{where}: job", jobs))

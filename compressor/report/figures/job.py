@@ -211,7 +211,8 @@ def split_events(events: Sequence[tuple[float, str]]) -> dict[str, list[tuple[fl
     for angle, name in events:
         what, _, word = name.rpartition(" ")
         end, _, valve = what.partition(" ")
-        lane = f"{valve}, {end} end" if end in BY_END else what
+        lane = what if end == "cam:" else f"{what} open"
+        lane = f"{valve} open, {end} end" if end in BY_END else lane
         spans = found.setdefault(lane, [])
         if word in BEGINS:
             begun[lane] = angle
@@ -242,8 +243,7 @@ def plot_events(
         y = np.full(angles.size, -float(len(lanes)))
         panel.plot(angles, y, style.mark(color, shape, 5), name, listed=False)
         lanes.append(name)
-    if spans:
-        panel.title = f"bars: {'the cam dwells' if 'cam: dwell' in spans else 'a valve is open'}"
+    panel.title = "events"
     panel.name_ticks("y", lanes, -np.arange(len(lanes)))
     panel.span("y", 0.6 - len(lanes), 0.8)
     panel.x.showgrid = panel.y.showgrid = False

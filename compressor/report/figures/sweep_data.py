@@ -126,7 +126,7 @@ def shown_value(value: Any) -> str:
 
 
 LOG_RATIO = 100.0  # numbers that span more are drawn on a log scale
-LONG_PHRASE = 32  # letters of a phrase
+LONG_PHRASE = 30  # letters of a phrase: less than of one joint, so that both have one form
 
 
 @dataclass(frozen=True)
