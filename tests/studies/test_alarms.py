@@ -314,7 +314,7 @@ def test_mistakes_are_named(worn_store, worn, compsim, tmp_path):
         (worn, ["deaf"], "study deaf has no sensor's record: write `body: true` and `sensor: "),
         (worn, ["worn"], "study worn has 2 draws of a sound machine"),
         (worn, ["worn", "--revolutions", "30"], "has no record of 30 revolutions: 12 too_short"),
-        (worn_store, ["worn", "--band", "500-5000"], "is sampled at 8000 Hz, and its sensor"),
+        (worn_store, ["worn", "--band", "500-3900"], "passes up to 3125 Hz (sensor.low"),
         (worn_store, ["worn", "--band", "9-3"], "'9-3' is no band such as 1000-3000, in Hz"),
         (worn_store, ["worn", "--false-alarms", "7"], "7.0 is not in the range 0.0<x<1.0"),
         (worn_store, ["worn", "--revolutions", "1"], "1 is not in the range x>=2"),

@@ -190,9 +190,10 @@ def read_study(
         case, record = job.case, job.record
         assert case.body  # which made the record
         assert case.sensor
-        passes = min(case.sensor.low_pass_Hz or math.inf, case.sensor.mounting_Hz)
+        corner = case.sensor.low_pass_Hz or record.rate / vibration.USABLE
+        passes = min(corner, case.sensor.mounting_Hz)
         bands = bands or default_bands(record.rate, passes)
-        check_bands(bands, job.key, record.rate, passes)
+        check_bands(bands, job.key, passes)
         if len(record.tacho) - 1 < revolutions or not np.ptp(record.values):
             left["too_short" if np.ptp(record.values) else "silent_record"] += 1
             continue
@@ -229,13 +230,12 @@ def read_study(
     return Windows(joints, clearances, draws, keys, stacked, clipped)
 
 
-def check_bands(bands: Sequence[Band], key: str, rate: float, passes: float) -> None:
-    """Raise StudyError unless a job's record holds the bands; passes: as `default_bands` has it."""
-    top = min(rate / 2.0, passes)
+def check_bands(bands: Sequence[Band], key: str, passes: float) -> None:
+    """Raise StudyError unless a job's sensor passes the bands; passes: as in `default_bands`."""
     for low, high in bands:
-        if high > top * (1.0 + 1e-9):
+        if high > passes * (1.0 + 1e-5):  # which is told in six digits
             raise frame.StudyError(
-                f"band {low:g}-{high:g} Hz: job {key} is sampled at {rate:.6g} Hz, and its sensor "
-                f"passes up to {passes:g} Hz (sensor.low_pass_Hz, or the resonance "
-                f"sensor.mounting_Hz): give bands up to {top:g} Hz"
+                f"band {low:g}-{high:g} Hz: the sensor of job {key} passes up to {passes:.6g} Hz "
+                "(sensor.low_pass_Hz, by default the rate over 2.56, or the resonance "
+                f"sensor.mounting_Hz): give bands up to {passes:.6g} Hz"
             )
