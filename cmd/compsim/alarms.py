@@ -61,9 +61,10 @@ def alarms(study, folder, output, run, quiet, **how) -> int:
     kurtosis of the record, peak and rms of segments of 10 degrees, counts of peaks, and velocity;
     each with and without band passes. Sound jobs set the usual reading and the limit. The table
     lists the alarms, the earliest first, each with its best filter: the limit over the usual
-    reading, the rate of false alarms, counted on sound draws that did not set the limit, and the
-    clearance from which on it detects, with 95 % intervals. "> 0.4" is beyond the study's greatest
-    clearance. RUN is a file of compsim wear, or its folder of results.
+    reading (of counts, over one a revolution at least), the rate of false alarms, counted on sound
+    draws that did not set the limit, and the clearance from which on it detects, with 95 %
+    intervals. "> 0.4" is beyond the study's greatest clearance. RUN is a file of compsim
+    wear, or its folder of results.
     """
     from compressor.digits import align_columns
     from compressor.report import title_figure, write_figure

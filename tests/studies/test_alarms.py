@@ -47,6 +47,7 @@ def test_wilsons_interval_in_closed_form():
     none, whole = (alarms.compute_rate(trips, names(10)) for trips in (np.zeros(10), np.ones(10)))
     assert none == pytest.approx((0, 0, square / (10 + square)))
     assert whole == pytest.approx((1, 10 / (10 + square), 1))
+    assert (none[1], whole[2]) == (0.0, 1.0)  # not 2.8e-15
     _, low, high = alarms.compute_rate(np.arange(40) % 2, names(40))
     assert low + high == pytest.approx(1.0)
     assert (high - 0.5) ** 2 * (1 + square / 40) == pytest.approx(0.25 * square / 40)
@@ -265,6 +266,7 @@ def test_the_table_has_the_first_alarm_of_each_joint_first(written):
         "windows: 2 revolutions", "limits: for 1.6 % of false alarms", alarms.CAPTION,
     ):  # fmt: skip
         assert f"{line}\n" in out
+    assert "  limit / usual  " in out
     rows = [line for line in out.splitlines() if line.startswith(("big_end ", "small_", "both "))]
     assert len(rows) == 3 * KINDS
     for joint in ("big_end", "small_end", "both"):

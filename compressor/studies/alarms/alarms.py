@@ -81,8 +81,10 @@ def compute_rate(trips: np.ndarray, draws: np.ndarray) -> tuple[float, float, fl
     spread = Z**2 / sizes.size
     middle = (share + spread / 2.0) / (1.0 + spread)
     half = Z * math.sqrt(share * (1.0 - share) / sizes.size + spread / 4.0 / sizes.size)
-    low, high = middle - half / (1.0 + spread), middle + half / (1.0 + spread)
-    return share, max(low, 0.0), min(high, 1.0)
+    # of none and of all an end is exact, which rounding would miss
+    low = middle - half / (1.0 + spread) if share > 0.0 else 0.0
+    high = middle + half / (1.0 + spread) if share < 1.0 else 1.0
+    return share, low, high
 
 
 def find_onset(clearances: np.ndarray, rates: np.ndarray) -> list[float]:
@@ -284,7 +286,15 @@ def list_rows(found: xr.Dataset) -> list[tuple[str, ...]]:
     """
     hours = ["hours before the limit"] * ("hours" in found)
     rows: list[tuple[str, ...]] = [
-        ("joint", "noise, m/s2", "alarm", "limit", "false alarms, %", "detects from, mm", *hours)
+        (
+            "joint",
+            "noise, m/s2",
+            "alarm",
+            "limit / usual",
+            "false alarms, %",
+            "detects from, mm",
+            *hours,
+        )
     ]
     for joint in found["joint"].values.tolist():
         greatest = found["clearance_high"].values[found["worn_joint"].values == joint].max()
