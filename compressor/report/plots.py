@@ -14,6 +14,7 @@ from compressor import analysis, cases, store
 from compressor.metrics import JOINTS
 from compressor.program import CompsimError
 from compressor.reasons import remedy
+from compressor.report.answer import name_jobs
 from compressor.report.figures import FIGURES, SweptRow
 from compressor.report.figures.drawing import as_csv, thin_places
 from compressor.report.figures.pictures import render
@@ -153,13 +154,13 @@ def draw_study(stored: Stored, study: StoredStudy, choice: PlotChoice) -> Iterat
         )
     figures = choose_figures(choice.what, [*STUDY], f"study {study.name}")
     over = choose_axis(stored.folder, study, choice.over)
-    jobs, where = select_jobs(stored.folder, study, over, choice.at, MAX_ROWS)
+    jobs, title, where = select_jobs(stored.folder, study, over, choice.at, MAX_ROWS)
     rows = [swept_row(stored, value, key) for value, key in jobs]
     if not any(row.shaking for row in rows):
         raise PlotError(nothing_to_draw(stored, study, rows))
     for name in figures:
         kept = keep_sensed(rows) if name == "cycles" else rows
-        shown = STUDY[name].make(kept, axis_words(over), units=choice.units)
+        shown = STUDY[name].make(kept, title, units=choice.units)
         shown.figure.layout.title = study_title(study, shown.title, where)
         yield shown._replace(note=spell_where(where))
 
@@ -204,34 +205,48 @@ def axis_words(key: str) -> str:
 MAX_PAGE_ROWS = 12  # of a study's jobs whose series a page reads
 
 
-def draw_for_page(stored: Stored, study: StoredStudy, units: Units) -> Iterator[DrawnFigure]:
-    """Yield what a page draws of a study over the crank angle.
+def draw_for_page(
+    stored: Stored, study: StoredStudy, data: xr.Dataset, units: Units
+) -> Iterator[DrawnFigure]:
+    """Yield what a page draws of a study over the crank angle; data: as `open_study` gives it.
 
-    The vibration along an axis, and the revolution of the job where it is greatest. Nothing of a
-    study that kept no series.
+    The vibration along an axis, and the revolution of the job where it is greatest, of all in the
+    study. Nothing of a study that kept no series.
     """
     over = choose_axis(stored.folder, study, "")
-    jobs, where = select_jobs(stored.folder, study, over, (), MAX_PAGE_ROWS)
-    drawn = spell_where(where)
+    jobs, axis, where = select_jobs(stored.folder, study, over, (), MAX_PAGE_ROWS)
     rows = keep_sensed([swept_row(stored, value, key, ["cycle"]) for value, key in jobs])
-    known = {n: row.cycle for n, row in enumerate(rows) if row.cycle}
+    known = sum(row.cycle is not None for row in rows)
     if not known:
         return
-    if len(known) > 1:
-        title = f"vibration over crank angle and {axis_words(over)}"
-        shown = STUDY["cycles"].make(rows, axis_words(over), units=units)
-        yield shown._replace(title=title, note=drawn)
-    loudest = max(known, key=lambda n: np.abs(known[n].vibration).max())
-    run = stored.job(jobs[loudest][1])
+    if known > 1:
+        title = f"vibration over crank angle and {axis}"
+        shown = STUDY["cycles"].make(rows, axis, units=units)
+        yield shown._replace(title=title, note=spell_where(where))
+    run, value = find_loudest(stored, data)
     case = analysis.case_of(run)
+    value += f" ({JOINT_WORDS[case.joint]})"
     twin = analysis.healthy_twin(run) if case.joint != "none" else None
-    value = f"{over} {rows[loudest].value}" if jobs[loudest][0] != "" else rows[loudest].value
     shown = JOB["analyst"].make(run, twin, units=units)
-    note = " It is the job with the greatest vibration of these." if len(known) > 1 else ""
-    yield shown._replace(title=f"{shown.title}, {value}", note=note + drawn)
+    note = " Of the study's jobs with series it has the greatest vibration." * (study.jobs > 1)
+    yield shown._replace(title=f"{shown.title}, {value}", note=note)
     if case.load == "gas":
         shown = JOB["cards"].make(run, twin, units=units)
         yield shown._replace(title=f"{shown.title}, {value}")
+
+
+def find_loudest(stored: Stored, data: xr.Dataset) -> tuple[xr.Dataset, str]:
+    """Return the job of a study whose vibration is greatest, and its swept values in words.
+
+    Of those whose revolution can be read, at least one; by the sensor where any job has one.
+    """
+    sensed = "sensor_peak" in data and bool(data["sensor_peak"].notnull().any())
+    peaks = data["sensor_peak" if sensed else "peak_acceleration"].values.ravel()
+    for n in np.argsort(-peaks, kind="stable"):  # nan last
+        key = str(data["key"].values.flat[n])
+        if swept_row(stored, "", key, ["cycle"]).cycle:
+            break
+    return stored.job(key), name_jobs(data)[n] or key[:KEY_DIGITS]
 
 
 def keep_sensed(rows: Sequence[SweptRow]) -> list[SweptRow]:
@@ -273,10 +288,11 @@ def choose_axis(folder: store.Folder, study: StoredStudy, name: str) -> str:
 
 def select_jobs(
     folder: store.Folder, study: StoredStudy, over: str, at: Sequence[str], most: int
-) -> tuple[list[tuple[Any, str]], list[str]]:
-    """Return (value, key) of the jobs along an axis in its order, and the other axes in words.
+) -> tuple[list[tuple[str, str]], str, list[str]]:
+    """Return (value, key) of jobs along an axis in its order, its title, the other axes in words.
 
-    At most `most`. Raises PlotError where `at` names no job, or the axis itself.
+    At most `most`. Where both clearances vary, a value is both: one alone would seem to be the
+    cause of what the other does. Raises PlotError where `at` names no job, or the axis itself.
     """
     fixed = {}
     for text in at:
@@ -287,21 +303,27 @@ def select_jobs(
     if study.is_grid:
         first = {axis.key: axis.values[0] for axis in study.axes if axis.key != over}
         fixed = first | fixed
+    varied = [axis.key for axis in study.axes if axis.key not in (over, *fixed)]
+    group = over.partition(".")[0]
+    beside = [key for key in varied if key.partition(".")[0] == group == "clearance_mm"]
     jobs = [
-        (point.get(over, ""), key)
+        (point, key)
         for point, key in zip(cases.points(study), study.keys, strict=True)
         if all(point.get(name) == value for name, value in fixed.items())
     ]
     if not jobs:
         raise PlotError(f"no job of {study.name} has {', '.join(at)}")
-    numbers = all(isinstance(value, int | float) for value, _ in jobs)
-    jobs.sort(key=lambda job: job[0] if numbers else 0)
+    numbers = all(isinstance(point.get(over), int | float) for point, _ in jobs)
+    jobs.sort(key=lambda job: job[0][over] if numbers else 0)
     values = ", ".join(f"{name} {shown_value(value)}" for name, value in fixed.items())
-    varied = ", ".join(axis.key for axis in study.axes if axis.key not in (over, *fixed))
-    where = [values] * bool(values) + [f"{varied} vary along with it"] * bool(varied)
+    where = [values] * bool(values)
+    where += [f"in the order of {over}, {', '.join(varied)} vary along with it"] * bool(varied)
     if len(jobs) > most:
         where.append(f"{most} of {len(jobs)} jobs, evenly chosen")
-    return [jobs[n] for n in thin_places(len(jobs), most)], where
+    names = [" / ".join(shown_value(point.get(name, "")) for name in (over, *beside))
+             for point, _ in jobs]  # fmt: skip
+    title = " / ".join(map(axis_words, (over, *beside)))
+    return [(names[n], jobs[n][1]) for n in thin_places(len(jobs), most)], title, where
 
 
 def spell_where(where: Sequence[str]) -> str:
@@ -312,9 +334,9 @@ def spell_where(where: Sequence[str]) -> str:
 READ = {"cycle": analysis.read_cycle, "shaking": analysis.shaking}  # parts of a `SweptRow`
 
 
-def swept_row(stored: Stored, value: Any, key: str, parts: Collection[str] = (*READ,)) -> SweptRow:
+def swept_row(stored: Stored, value: str, key: str, parts: Collection[str] = (*READ,)) -> SweptRow:
     """Return one job as a row of a figure over an axis, with some parts, or why it has none."""
-    name = shown_value(value) if value != "" else key[:KEY_DIGITS]
+    name = value or key[:KEY_DIGITS]
     status = stored.status(key)
     if status is None or status.status != "ok" or not status.samples:
         problem = "not run" if status is None else "failed" if status.reason else "no series"

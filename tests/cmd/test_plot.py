@@ -4,6 +4,7 @@ import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,9 +12,10 @@ from compsim import cli
 from conftest import damage_series, store_cases
 
 from compressor.analysis.shaking import frame_forces
+from compressor.metrics import JOINTS
 from compressor.report.figures import FIGURES
 from compressor.report.figures.table import spell
-from compressor.report.plots import job_title
+from compressor.report.plots import job_title, select_jobs
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
 
@@ -137,6 +139,18 @@ def test_a_study_is_drawn_along_an_axis(plot, folder, unpainted):
     _, default = plot("worn")[1].values()
     assert "each value of clearance (mm)" in default
     assert "Here machine.speed_rpm 400." in default
+
+
+def test_rows_name_both_clearances():
+    """Rows by one clearance alone showed the other's effect as if it were its own."""
+    sizes = [0.3, 0.1], [0.05, 0.35]
+    axes = [SimpleNamespace(key=f"clearance_mm.{joint}", values=values)
+            for joint, values in zip(JOINTS, sizes, strict=True)]  # fmt: skip
+    study = SimpleNamespace(name="two", axes=axes, keys=["a", "b"], jobs=2, is_grid=False)
+    jobs, title, where = select_jobs("", study, axes[0].key, (), 5)
+    assert jobs == [("0.1 / 0.35", "b"), ("0.3 / 0.05", "a")]
+    assert title == "clearance, big end (mm) / clearance, small end (mm)"
+    assert where == [f"in the order of {axes[0].key}, {axes[1].key} vary along with it"]
 
 
 def test_a_damaged_job_is_a_row_without_series(folder, tmp_path, compsim, unpainted):

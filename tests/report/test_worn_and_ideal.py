@@ -100,11 +100,11 @@ def test_a_job_by_itself_and_one_without_clearance(study):
 
 def test_a_twin_that_fails_stands_nowhere(swept, study, monkeypatch):
     (stored, data), (own,) = study, read_studies(swept)
-    drawn = {one.name: one.figure for one in draw_for_page(stored, own, "usual")}
+    drawn = {one.name: one.figure for one in draw_for_page(stored, own, data, "usual")}
     monkeypatch.setattr(side_by_side, "healthy_twin", lambda run: None)
     monkeypatch.setattr("compressor.analysis.healthy_twin", lambda run: None)
     assert compare_healthy(stored, data) is None
-    alone = {one.name: one.figure for one in draw_for_page(stored, own, "usual")}
+    alone = {one.name: one.figure for one in draw_for_page(stored, own, data, "usual")}
     assert [*alone] == [*drawn]
     names = [{trace.name for trace in figures["analyst"].data} for figures in (drawn, alone)]
     assert names[0] - names[1] == {NAMES["twin"]}
