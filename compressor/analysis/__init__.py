@@ -6,7 +6,13 @@ from compressor.analysis.claims import RULES, Claim, claim_margins, claims
 from compressor.analysis.contacts import impacts, joints_with_clearance
 from compressor.analysis.cycle import Cycle, read_cycle
 from compressor.analysis.cylinder import end_states
-from compressor.analysis.effects import Effects, grid_effects, saltelli_design, sampled_effects
+from compressor.analysis.effects import (
+    Effects,
+    correlate_ranks,
+    grid_effects,
+    saltelli_design,
+    sampled_effects,
+)
 from compressor.analysis.machine_numbers import MachineDescription, describe_cases, describe_machine
 from compressor.analysis.margins import mean_peak
 from compressor.analysis.runs import (

@@ -381,6 +381,16 @@ def test_correlations_are_told_with_their_intervals():
     assert found.error_x.array is not None
 
 
+def test_keys_that_go_together_are_told():
+    """Where joints wear one at a time, the other's clearance seemed to lessen its knock."""
+    columns = {"clearance_mm": SPEED - 0.5 * CLEARANCE, "speed_rpm": SPEED}
+    told = plan(listed(columns, 1 + CLEARANCE + SPEED))["ranking"].sentence
+    assert re.search(
+        r"one's effect may be the other's: clearance and speed \(0\.[6-9]\d\)\.$", told
+    )
+    assert "other's" not in plan(listed(COLUMNS, 1 + CLEARANCE))["ranking"].sentence
+
+
 def test_blocks_of_a_design_with_a_failed_job_are_left_out():
     """y = 1 + x1 + 3 x2, of 64 blocks six with a failed job: the first 32 whole ones count."""
     points = np.array(design("saltelli", 64, 2, 1))

@@ -1,10 +1,12 @@
 """Chooses how a study's sweep is drawn, by its axes, and says what is seen."""
 
+import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 import xarray as xr
 
+from compressor import analysis
 from compressor.report.figures import sweep_maps, sweep_panels
 from compressor.report.figures.sweep_data import (
     Measure,
@@ -33,6 +35,9 @@ RANKS = (
     "ratio of ranks, of numbers with 95 % intervals. An effect that rises and falls again is not "
     "seen in it."
 )
+
+
+TIED = 0.5  # correlation of ranks of two keys, beyond which they go together
 
 
 def draw_sweep(
@@ -150,11 +155,27 @@ def draw_ranked(
                  f"up to {most}")] * bool(most)  # fmt: skip
     numbers += [("not ranked, as too few values are known or all are the same", ", ".join(left))
                 ] * bool(left)  # fmt: skip
-    sentence = {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS}[kind]
+    sentence = {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS + tell_tied(sweep)}[kind]
     title = "what explains the spread of each metric"
     yield DrawnFigure(
         sweep_maps.draw_ranking(sweep, found), sentence, numbers, "", "ranking", title
     )
+
+
+def tell_tied(sweep: PlottedSweep) -> str:
+    """Return the sentence on pairs of keys that go together over the jobs, if there are any."""
+    if sweep.is_grid:
+        return ""
+    pairs = []
+    numbers = (axis for axis in sweep.axes if not axis.is_words)
+    for one, other in itertools.combinations(numbers, 2):
+        x, y = one.places, other.places
+        known = np.isfinite(x) & np.isfinite(y)
+        if np.unique(y[known]).size > 1:
+            found, _, _ = analysis.correlate_ranks(x[known], y[known])
+            pairs += [f"{one.phrase} and {other.phrase} ({found:.2f})"] * (abs(found) > TIED)
+    text = ", ".join(pairs).replace("-", "−")
+    return f" These keys go together, so that one's effect may be the other's: {text}." * bool(text)
 
 
 def split_measures(
