@@ -140,6 +140,10 @@ def test_the_caption_has_the_numbers(sensed, twin, drawn):
     assert "record of the sensor: guide, along y" in found.sentence
     words = f"{spell(peak)} m/s² ({spell(peak / 9.80665)} g) at {at:.0f}°"
     assert told["greatest acceleration"] == words
+    whole = spell(sensed["sensor_peak"], "m/s²")
+    assert told["over all settled revolutions"].startswith(f"sensor peak {whole}")
+    step = f"along y, every {360 / 3072:.3g}°, and rod load below, every 0.3°; peaks are of these"
+    assert step in found.sentence
     assert told["rms"] == spell(math.sqrt(np.mean(record**2)), "m/s²")
     assert told["greatest without clearance"] == spell(ideal, "m/s²")
     load = frame_forces(sensed)["rod_load"][2400:3601] / 1e3

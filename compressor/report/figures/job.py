@@ -11,6 +11,7 @@ from compressor.cases import Sensor
 from compressor.metrics import JOINTS
 from compressor.report.figures import curves, style
 from compressor.report.figures.drawing import WAYS, Panel, circle, join_with_gaps, make_grid
+from compressor.report.figures.sweep_data import MEASURES
 from compressor.report.figures.table import DrawnFigure, Number, figure, spell, spell_span
 from compressor.store import CLIPPED
 from compressor.units import Units, unit_in
@@ -21,6 +22,7 @@ BY_JOINT = dict(zip(JOINTS, ((style.BLUE, "circle"), (style.RED, "diamond")), st
 CORNERS = {0: ("top dead centre", "circle"), 90: ("90°", "triangle-up"),
            180: ("bottom dead centre", "square"), 270: ("270°", "triangle-down")}  # fmt: skip
 MICROMETRE = 1e6
+ROD_LOADS = ("peak_rod_load_tension", "peak_rod_load_compression")
 MAX_ANGLES = 12  # that a caption lists
 _, G = unit_in("m/s²", "plant")  # from m/s2 to g
 Twin: TypeAlias = xr.Dataset | None  # the same machine without clearance
@@ -97,8 +99,13 @@ def draw_analyst(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     load.title = "rod load at the crosshead pin, tension positive; dashed: it changes its side"
     for panel in drawing.panels:
         show_turn(panel)
-    sentence = f"The last settled revolution: {vibration.title}, and rod load below."
+    sentence = (
+        f"The last settled revolution: {vibration.title}, every {spell_step(found.angle)}, and rod "
+        f"load below, every {spell_step(found.load_angle)}; peaks are of these samples."
+    )
     numbers = number_analyst(found, word)
+    vibrates = "sensor_peak" if found.is_sensed else "peak_acceleration"
+    numbers += number_metrics(run, vibrates, *ROD_LOADS)
     if twin is not None:
         peak, _ = loudest(analysis.read_cycle(twin))
         numbers.insert(2, ("greatest without clearance", spell(peak, "m/s²")))
@@ -123,6 +130,19 @@ def number_analyst(found: analysis.Cycle, contact: str) -> list[Number]:
         *([("events", events)] if events else []),
         *struck,
     ]
+
+
+def spell_step(angle: np.ndarray) -> str:
+    """Return how far samples are apart."""
+    return f"{np.median(np.diff(angle)):.3g}°"
+
+
+def number_metrics(run: xr.Dataset, *names: str) -> list[Number]:
+    """Return the job's metrics of some names, which no sampling or single revolution lessens."""
+    shown = [one for one in MEASURES if one.variable in names and one.variable in run]
+    texts = [f"{one.title} {spell(one.of(run), one.unit)}" for one in shown
+             if np.isfinite(one.of(run))]  # fmt: skip
+    return [("over all settled revolutions", ", ".join(texts))] * bool(texts)
 
 
 def spell_turns(angles: Sequence[float] | np.ndarray) -> str:
@@ -197,7 +217,11 @@ def draw_signals(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
             numbers.append((f"{signal.title}{where}", spell_span(values, signal.unit)))
         panels[0, 0].span("x", degrees[0], degrees[-1])
     panels[0, 0].x.dtick = 90.0
-    sentence = "The last settled revolution over crank angle, at stored samples."
+    numbers += number_metrics(run, "peak_acceleration", *ROD_LOADS)
+    sentence = (
+        "The last settled revolution over crank angle, at stored samples, every "
+        f"{spell_step(analysis.last_revolution(run)[0])}; peaks are of these."
+    )
     return DrawnFigure(drawing.figure(), sentence + caution(run), numbers)
 
 
@@ -300,7 +324,11 @@ def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
             plot_lines(panel, found.amplitudes, line, NAMES[name])
             numbers.append((label, spell(found.above, "N")))
     panel.x.title = ORDERS_AXIS
-    sentence = f"Peak amplitudes over the settled revolutions; dashed: order {analysis.ORDER}."
+    step = spell_step(analysis.last_revolution(run)[0])
+    sentence = (
+        f"Peak amplitudes over the settled revolutions, of stored samples, every {step}; dashed: "
+        f"order {analysis.ORDER}."
+    )
     return DrawnFigure(drawing.figure(), sentence + caution(run), numbers)
 
 
