@@ -3,19 +3,12 @@
 import numpy as np
 import xarray as xr
 
-UNITS = {
-    "clearance_mm": "mm",
-    "speed_rpm": "rpm",
-    "rod_mass_kg": "kg",
-    "load": "",
-    "fault": "",
-    "law": "",
-}
+UNITS = {"clearance_mm": "mm", "speed_rpm": "rpm", "rod_mass_kg": "kg"}
 
 
 def coordinate(dim, name, values):
     key = "joint" if name == "fault" else name
-    attrs = {"case_key": key} | ({"units": UNITS[name]} if UNITS[name] else {})
+    attrs = {"case_key": key} | ({"units": UNITS[name]} if name in UNITS else {})
     return xr.Variable(dim, np.array(values), attrs)
 
 

@@ -6,6 +6,7 @@ blocks run there; `bash` and `py` blocks are not run.
 """
 
 import json
+import pydoc
 import re
 import shlex
 
@@ -67,24 +68,12 @@ EXAMPLES = (
 )  # fmt: skip
 
 
-def module_of(name):
-    """The file of a dotted name, and what is left of the name: an attribute."""
-    parts = name.split(".")
-    for count in range(len(parts), 0, -1):
-        base = ROOT.joinpath(*parts[:count])
-        for path in (base.with_suffix(".py"), base / "__init__.py"):
-            if path.exists():
-                return path.read_text(encoding="utf-8"), parts[count:]
-    return "", parts
-
-
 def test_modules_and_files_that_texts_name_are_there():
     lost = []
     for path in [*SOURCES, *(ROOT / page for page in PAGES if "results" not in page)]:
         text = path.read_text(encoding="utf-8")
         for name in re.findall(r"`(compressor(?:\.\w+)+)`", text):
-            source, rest = module_of(name)
-            if rest and not re.search(rf"\b{rest[0]}\b", source):
+            if pydoc.locate(name) is None:
                 lost.append((path.name, name))
         for name in re.findall(r"`((?:[a-z_]+/)+[a-z_0-9]+(?:\.py)?)`", text):
             places = [ROOT / place / name for place in PLACES] + [path.parent / name]
