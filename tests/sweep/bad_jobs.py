@@ -51,7 +51,7 @@ POISON = {
     "crash": (lambda: os.kill(os.getpid(), signal.SIGSEGV), "worker_died", "SIGSEGV"),
     "killed": (lambda: os.kill(os.getpid(), signal.SIGKILL), "worker_died", "out of memory, or"),
     "leave": (lambda: os._exit(3), "worker_died", "exit code 3"),
-    "hang": (hang, "budget_seconds", "more than 1 s of wall time"),
+    "hang": (hang, "budget_seconds", " s of wall time"),
     "stop": (stop, "budget_seconds", "its worker was killed"),
     "bomb": (swell, "out_of_memory", "0.4 GB"),
     "raise": (fail, "internal_error", "Unprintable"),
