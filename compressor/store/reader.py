@@ -11,6 +11,7 @@ from compressor.store.studies import StoredStudy, find_study, read_studies, whol
 if TYPE_CHECKING:
     import xarray as xr
 
+KEY_DIGITS = 20  # of a whole key
 BOTH_JOINTS = (
     "`fault` is the swept joint, and `joint` the one that a number belongs to: select both, as in "
     "study.sel(fault='big_end', joint='big_end')"
@@ -33,7 +34,7 @@ def read_job(folder: Folder, key: str) -> "xr.Dataset":
     (('time',), 'big_end')
     """
     stored = read_store(folder)
-    if stored.position(key) is None:
+    if len(key) < KEY_DIGITS:
         key = whole_key(folder, key, read_studies(folder), stored.keys())
     return stored.job(key)
 
