@@ -11,7 +11,7 @@ from compressor.store.studies import StoredStudy, find_study, read_studies, whol
 if TYPE_CHECKING:
     import xarray as xr
 
-KEY_DIGITS = 20  # of a whole key
+WHOLE_KEY = 20  # digits
 BOTH_JOINTS = (
     "`fault` is the swept joint, and `joint` the one that a number belongs to: select both, as in "
     "study.sel(fault='big_end', joint='big_end')"
@@ -34,7 +34,7 @@ def read_job(folder: Folder, key: str) -> "xr.Dataset":
     (('time',), 'big_end')
     """
     stored = read_store(folder)
-    if len(key) < KEY_DIGITS:
+    if len(key) < WHOLE_KEY:
         key = whole_key(folder, key, read_studies(folder), stored.keys())
     return stored.job(key)
 
