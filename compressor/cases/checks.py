@@ -181,6 +181,7 @@ def of_other_quantity(name: str, group: str, value: Any) -> str:
         if re.search(words, name) and (is_near or "pin_radius" in form):
             ours, factor = OTHER_UNITS.get(name.rpartition("_")[2], ("mm", 1.0))
             factor = factor if ours == "mm" else math.nan
+            value = None if isinstance(value, Mapping) and "{{" in form else value
             half, whole = (_scaled(value, factor / n) for n in (2, 1))
             return "; write " + form.format(half=half, whole=whole)
     return ""

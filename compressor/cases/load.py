@@ -306,6 +306,7 @@ def _check_cases(
     Raises CaseFileError.
     """
     wrong: Located = {}
+    misfits: Located = {}  # told behind what is wrong alone, from which some follow
     keys: list[str] = []
     selected: list[int] = []
     values: dict[str, list[Any]] = {key: [] for key in columns}
@@ -317,9 +318,11 @@ def _check_cases(
         try:
             case = block.case(place)
         except CaseError as error:
-            wrong = block.locate(error, block.rows_of(place)) | wrong
+            found = misfits if error.is_misfit else wrong
+            for where, problem in block.locate(error, block.rows_of(place)).items():
+                found.setdefault(where, problem)
             continue
-        if not wrong:
+        if not (wrong or misfits):
             keys.append(case.key)
             given = block.given_of(place) if columns or only else {}
             for key in columns:
@@ -327,9 +330,10 @@ def _check_cases(
             if only is None or is_selected(only, given, case):
                 selected.append(number)
     progress(total, total, "")
+    wrong |= {where: problem for where, problem in misfits.items() if where not in wrong}
     problems = [*itertools.islice(wrong.values(), MAX_CONFLICTS)]
     if len(wrong) > MAX_CONFLICTS:
-        message = f"{len(wrong)} conflicts between swept values; the first {MAX_CONFLICTS} are"
+        message = f"{len(wrong)} problems of swept values; the first {MAX_CONFLICTS} are"
         problems.append(Problem("", message, Place(file.path)))
     if problems:
         raise CaseFileError(problems)

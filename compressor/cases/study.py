@@ -111,7 +111,7 @@ class Block:
         every = range(math.prod(len(self.columns[keys[0]]) for keys in self.factors))
         if not self.exclusions:
             return every
-        jobs = ((n, reader(self.given_of(n), partial(self._case_if_any, n))) for n in every)
+        jobs = ((n, reader(self.given_of(n), cache(partial(self._case_if_any, n)))) for n in every)
         return [number for number, job in jobs if not any(test(job) for test in self.exclusions)]
 
     def rows_of(self, number: int) -> dict[str, int]:

@@ -1,5 +1,6 @@
 """`compsim plot`: figures of one job, or of a study along one of its axes, as files."""
 
+import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -305,7 +306,7 @@ def select_jobs(
         fixed = first | fixed
     varied = [axis.key for axis in study.axes if axis.key not in (over, *fixed)]
     group = over.partition(".")[0]
-    beside = [key for key in varied if key.partition(".")[0] == group == "clearance_mm"]
+    beside = [key for key in varied if key.partition(".")[0] == group == "clearance_mm" != over]
     jobs = [
         (point, key)
         for point, key in zip(cases.points(study), study.keys, strict=True)
@@ -313,11 +314,13 @@ def select_jobs(
     ]
     if not jobs:
         raise PlotError(f"no job of {study.name} has {', '.join(at)}")
-    numbers = all(isinstance(point.get(over), int | float) for point, _ in jobs)
-    jobs.sort(key=lambda job: job[0][over] if numbers else 0)
+    numbers = [isinstance(point.get(over), int | float) for point, _ in jobs]
+    # a job without a clearance comes first
+    jobs.sort(key=lambda job: n if isinstance(n := job[0].get(over), int | float) else -math.inf)
     values = ", ".join(f"{name} {shown_value(value)}" for name, value in fixed.items())
     where = [values] * bool(values)
-    where += [f"in the order of {over}, {', '.join(varied)} vary along with it"] * bool(varied)
+    order = f"in the order of {over}, " * any(numbers)
+    where += [f"{order}{', '.join(varied)} vary along with it"] * bool(varied)
     if len(jobs) > most:
         where.append(f"{most} of {len(jobs)} jobs, evenly chosen")
     names = [" / ".join(shown_value(point.get(name, "")) for name in (over, *beside))

@@ -1,7 +1,6 @@
 """The section of a report about a user's own study: its failures, its table and its figures."""
 
 import re
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -74,15 +73,12 @@ def study_sections(
 
     notes: lines that others add to the first; limits: of metrics, whose zones the table shows.
     """
-    failed = Counter(data["reason"].values[data["status"].values == "failed"].tolist())
     anchor = file_name("jobs", study.name)
     content = StudyContent(
         study=study,
         counts=job_counts(data).text,
         caveats=study_caveats(stored, study),
-        failures=[
-            f"{plural(n)} failed, {reason}: {remedy(reason)}" for reason, n in failed.items()
-        ],
+        failures=list_failures(stored, data),
         figures=figures,
         jobs=anchor,
         notes=notes,
@@ -132,6 +128,22 @@ def job_facts(data: xr.Dataset, keys: Sequence[str]) -> page.JobFacts:
         point = [page.value_cell(values[n]).text for values in swept.values()]
         found[key] = [*point, page.status_text(status[n], reason[n])]
     return page.JobFacts([*swept, "status"], found)
+
+
+def list_failures(stored: Stored, data: xr.Dataset) -> list[str]:
+    """Return how many jobs failed by reason, with the remedy, and what is said of the first."""
+    found: dict[str, list[str]] = {}
+    words = ("status", "reason", "key")
+    for status, reason, key in zip(*(data[name].values.flat for name in words), strict=True):
+        if status == "failed":
+            found.setdefault(str(reason), []).append(str(key))
+    lines = []
+    for reason, keys in found.items():
+        position = stored.position(keys[0])
+        detail = "gone" if position is None else stored.detail(position)
+        first = f"{'' if len(keys) == 1 else 'the first, '}job {keys[0][:KEY_DIGITS]}: {detail}"
+        lines.append(f"{plural(len(keys))} failed, {reason}: {remedy(reason)}; {first}")
+    return lines
 
 
 def jobs_table(

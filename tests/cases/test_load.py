@@ -98,7 +98,7 @@ def test_a_sweep_full_of_conflicts_is_cut_short(write):
     both = [*range(1, 31)]
     text = f"machine: {{rod_length_mm: {both}, crank_radius_mm: {both}}}\nload: none\n"
     found = mistakes(write(text))
-    assert found[0] == "case.yaml: 30 conflicts between swept values; the first 20 are"
+    assert found[0] == "case.yaml: 30 problems of swept values; the first 20 are"
     assert len(found) == 21
 
 

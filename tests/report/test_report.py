@@ -477,7 +477,8 @@ def test_a_study_whose_jobs_all_broke_has_a_page(own, tmp_path):
         broken.append(xr.Dataset({"status": "failed", "reason": "internal_error"}, attrs=attrs))
     replace_jobs(own, *broken)
     found = written(own, tmp_path)
-    assert found.text.count(f"4 jobs failed, internal_error: {Reason.INTERNAL_ERROR.remedy}") == 1
+    told = f"4 jobs failed, internal_error: {Reason.INTERNAL_ERROR.remedy}; the first, job "
+    assert found.text.count(told) == found.text.count(": ValueError: a bug") == 1
     assert not found.sources
 
 

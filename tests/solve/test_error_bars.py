@@ -193,7 +193,7 @@ def test_error_bars_hold_with_laws():
             simulate(Case.resolve({**values, "solve": {"duration_rev": 2, **solve}}))
             for solve in ({}, {"rtol": 1e-10, "error_bars": False})
         )
-        if run.attrs["regime"] == "chaotic":
+        if run.attrs["regime"] == "chaotic":  # such a motion has no bars
             chaotic += 1
             continue
         assert run.attrs["promise"] == "kept"

@@ -120,7 +120,8 @@ def in_lines(words: Sequence[str]) -> list[str]:
 def scale_y(panel: Panel, values: np.ndarray, bars: ArrayLike = ()) -> float:
     """Set the y axis for values, with room at the foot for marks; return the panel's span.
 
-    Logarithmic over decades. Values that differ by less than their error bars stand in the middle.
+    Logarithmic over decades. The axis spans MIN_BARS error bars and MIN_SHARE of the values at
+    least: those that differ by less stand in its middle.
     """
     bars, values = np.asarray(bars), values[np.isfinite(values)]
     bar = float(np.median(bars[np.isfinite(bars)])) if np.isfinite(bars).any() else 0.0
