@@ -54,6 +54,7 @@ def test_machine_code_belongs_to_its_sources(tmp_path, monkeypatch):
     for name in ("_jit.py", "contact.py"):
         (tmp_path / name).write_text("K = 1\n", encoding="utf-8")
     monkeypatch.setattr(program, "COMPILED", tmp_path)
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)  # where ours would go, too
     first = program.machine_code_folder()
     first.mkdir(parents=True)
     assert program.machine_code_folder() == first
