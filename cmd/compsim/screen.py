@@ -185,17 +185,17 @@ def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
 
 
 def caution(
-    studies: "Sequence[Study]", most: int | None = MAX_CAUTIONS, heeded: str = ""
+    studies: "Sequence[Study]", most: int | None = MAX_CAUTIONS, ignored: str = ""
 ) -> "dict[str, MachineDescription]":
     """Return what each study says of its machine; report what is odd about case files.
 
-    In at most `most` warnings a file; heeded: a group that only a run leaves out.
+    In at most `most` warnings a file; ignored: a group whose own warning is left out.
     """
     from compressor.analysis import cautions, describe_machine
 
     machines = {study.name: describe_machine(study) for study in studies}
     for study in studies:
-        found = [one for one in cautions(study) if one.key != heeded]
+        found = [one for one in cautions(study) if one.key != ignored]
         implausible = machines[study.name].remarks({one.key for one in found})
         texts = [f"{key}: {text}" for key, text in implausible.items()]
         for one in found:

@@ -35,7 +35,7 @@ def wear(configs, folder, jobs, rerun, as_json, quiet, **how) -> int:
 
     studies = read_cases(configs, quiet, **how)
     check_wear(studies)
-    screen.caution(studies, heeded="wear")
+    screen.caution(studies, ignored="wear")  # a run leaves wear out, this does not
     with ProgressReporter(quiet, "machines", folder=folder) as progress:
         machines, before = run_wear(studies, folder, jobs or cores(), progress, rerun)
     if as_json:

@@ -156,12 +156,13 @@ def share_apart(run: "xr.Dataset", joint: str) -> BarredNumber:
     """
     settled, _ = whole_revolutions(run)
 
-    def share(part: "xr.Dataset") -> float:
+    def look(part: "xr.Dataset") -> tuple[float, int]:
         series = contact_series(part, joint)
-        modes = modes_of(series, impacts_of(part, series))
-        return float((modes[:-1] != FOLLOWING).mean())
+        struck = impacts_of(part, series)
+        return float((modes_of(series, struck)[:-1] != FOLLOWING).mean()), len(struck)
 
-    hits = impacts_of(settled, contact_series(settled, joint))
+    if is_chaotic(run):
+        return measure(settled, lambda part: look(part)[0], math.nan)
+    share, count = look(settled)
     error = float(settled["contact_loss_fraction_error"].sel(joint=joint))
-    error += 2.0 * len(hits) / (settled.sizes["time"] - 1)
-    return measure(settled, share, error)
+    return BarredNumber(share, error + 2.0 * count / (settled.sizes["time"] - 1))

@@ -182,15 +182,16 @@ def of_other_quantity(name: str, group: str, value: Any) -> str:
             ours, factor = OTHER_UNITS.get(name.rpartition("_")[2], ("mm", 1.0))
             factor = factor if ours == "mm" else math.nan
             value = None if isinstance(value, Mapping) and "{{" in form else value
-            half, whole = (_scaled(value, factor / n) for n in (2, 1))
+            half, whole = (_spell_scaled(value, factor / n) for n in (2, 1))
             return "; write " + form.format(half=half, whole=whole)
     return ""
 
 
-def _scaled(value: Any, factor: float) -> str:
+def _spell_scaled(value: Any, factor: float) -> str:
     """Return a number, or one of each part, times a factor as a file has it; `...` if it cannot."""
     if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{part}: {_scaled(one, factor)}' for part, one in value.items())}}}"
+        parts = (f"{part}: {_spell_scaled(one, factor)}" for part, one in value.items())
+        return f"{{{', '.join(parts)}}}"
     return f"{value * factor:.12g}" if is_number(value) and math.isfinite(factor) else "..."
 
 

@@ -175,10 +175,8 @@ def drawn_study(
     with store.label_studies(stored, [study]) as data:
         named: list[tuple[str, DrawnFigure]] = []
         if not study.figures:
-            swept, turns = (
-                draw_sweep(data, limits, units),
-                draw_for_page(stored, study, data, units),
-            )
+            swept = draw_sweep(data, limits, units)
+            turns = draw_for_page(stored, study, data, units)
             named = [(study_section.file_name("sweep", study.name, one.name), one) for one in swept]
             named += [(study_section.file_name(one.name, study.name), one) for one in turns]
         figures = [one._replace(name=name, title=f"{study.name}: {one.title}")

@@ -285,14 +285,14 @@ def compare_record(
         text = f"none of the {len(wanted)} jobs has a sensor's record of two revolutions"
         raise frame.StudyError(f"{text}: run them with body: true, sensor: true and series kept")
     jobs.sort(key=lambda job: np.nan_to_num(job.likeness["difference"].value, nan=math.inf))
-    remarks = (*record.remarks, *doubts(mine.rpm, jobs))
+    remarks = (*record.remarks, *find_mistakes(mine.rpm, jobs))
     return Comparison(
         name, remarks, mine, own[mine.highest], mine.highest, tuple(jobs),
         len(wanted) - len(jobs),
     )  # fmt: skip
 
 
-def doubts(rpm: float, jobs: Sequence[Compared]) -> Iterator[str]:
+def find_mistakes(rpm: float, jobs: Sequence[Compared]) -> Iterator[str]:
     """Yield what was perhaps mistaken of a record: its unit, its speed; jobs: most alike first."""
     ratios = np.array([job.likeness["rms_ratio"].value for job in jobs])
     for size, text in MISTAKES.items():

@@ -37,7 +37,7 @@ RANKS = (
 )
 
 
-TIED = 0.5  # correlation of ranks of two keys, beyond which they go together
+CORRELATED = 0.5  # correlation of ranks of two keys, beyond which they go together
 
 
 def draw_sweep(
@@ -155,14 +155,16 @@ def draw_ranked(
                  f"up to {most}")] * bool(most)  # fmt: skip
     numbers += [("not ranked, as too few values are known or all are the same", ", ".join(left))
                 ] * bool(left)  # fmt: skip
-    sentence = {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS + tell_tied(sweep)}[kind]
+    sentence = {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS + spell_correlated(sweep)}[
+        kind
+    ]
     title = "what explains the spread of each metric"
     yield DrawnFigure(
         sweep_maps.draw_ranking(sweep, found), sentence, numbers, "", "ranking", title
     )
 
 
-def tell_tied(sweep: PlottedSweep) -> str:
+def spell_correlated(sweep: PlottedSweep) -> str:
     """Return the sentence on pairs of keys that go together over the jobs, if there are any."""
     if sweep.is_grid:
         return ""
@@ -173,7 +175,7 @@ def tell_tied(sweep: PlottedSweep) -> str:
         known = np.isfinite(x) & np.isfinite(y)
         if np.unique(y[known]).size > 1:
             found, _, _ = analysis.correlate_ranks(x[known], y[known])
-            pairs += [f"{one.phrase} and {other.phrase} ({found:.2f})"] * (abs(found) > TIED)
+            pairs += [f"{one.phrase} and {other.phrase} ({found:.2f})"] * (abs(found) > CORRELATED)
     text = ", ".join(pairs).replace("-", "−")
     return f" These keys go together, so that one's effect may be the other's: {text}." * bool(text)
 
