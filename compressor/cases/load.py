@@ -324,10 +324,9 @@ def _check_cases(
             continue
         if not (wrong or misfits):
             keys.append(case.key)
-            given = block.given_of(place) if columns or only else {}
             for key in columns:
-                values[key].append(axis_value(case, given, key))
-            if only is None or is_selected(only, given, case):
+                values[key].append(axis_value(case, block, place, key))
+            if only is None or is_selected(only, block.given_of(place), case):
                 selected.append(number)
     progress(total, total, "")
     wrong |= {where: problem for where, problem in misfits.items() if where not in wrong}
@@ -345,13 +344,13 @@ def is_selected(only: Test, given: Mapping[str, Any], case: Case) -> bool:
     return only(reader(given, lambda: case))
 
 
-def axis_value(case: Case, given: Mapping[str, Any], key: str) -> Any:
+def axis_value(case: Case, block: Block, place: int, key: str) -> Any:
     """Return a job's value on an axis, as its case has it; None where it has none.
 
-    given: nested values of the file, which alone have what a case writes as without the key.
+    What a case writes as without the key the values of its place in the block alone have.
     """
     own = value_of(case, key)
-    return value_of(given, key) if own is None and reads(case, key) else own
+    return value_of(block.given_of(place), key) if own is None and reads(case, key) else own
 
 
 Where = tuple[Place, str]  # a key of a file, which may be given for several blocks or files

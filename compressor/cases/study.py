@@ -185,10 +185,12 @@ class Block:
         """Yield the values that stand twice in the lists of keys."""
         for keys in self.factors:
             sweep = self.sweeps[keys[0]]
+            if sweep.kind != "list":
+                continue
             seen: set[str] = set()
             columns = (self.columns[key] for key in keys)
             for number, values in enumerate(zip(*columns, strict=True)):
-                if (text := repr(values)) in seen and sweep.kind == "list":
+                if (text := repr(values)) in seen:
                     place = self.tree.at(*sweep.path, number)[1]
                     message = f"{', '.join(map(quote_value, values))} is in the list twice"
                     yield Problem(" with ".join(keys), message, place)
