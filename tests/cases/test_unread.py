@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from conftest import outcome_of
 
 from compressor.cases.case import Case
 from compressor.cases.checks import value_of
 from compressor.cases.load import CaseFileError, load_cases
 from compressor.cases.parameter import CaseError
 from compressor.cases.table import parts_by_key, table
-from compressor.solve import simulate
+from compressor.solve.simulate import observe
 from compressor.store.batch import encode_batch
 from compressor.studies.wear import Worn, life
 
@@ -251,15 +250,15 @@ def with_value(where: dict, key: str, value: object) -> dict:
 def stored(text: str) -> dict[str, str]:
     """Return what is stored of a case by name; of one with wear, of its first two stages too."""
     case = Case.resolve(json.loads(text))
-    run = simulate(case)
-    found = {name: repr(item.values.tolist()) for name, item in run.variables.items()}
-    del found["seconds"]
-    found["name"] = run.attrs["name"]
-    found["worn"] = Case.from_attribute(run.attrs["case"]).worn_joint
-    if case.output.keep == "metrics":
-        return {name: text for name, text in found.items() if name != "time"}
-    if case.steps > 1000:  # of long series: the text of the case is longer by the key
-        found["file"] = str(round(len(encode_batch([outcome_of(run)])) / 10_000))
+    run, series = observe(case)
+    run.numbers["seconds"] = 0.0
+    found = {name: values.tobytes().hex() for name, (_, values, _) in series.items()}
+    found |= run.words() | {"numbers": run.numbers.tobytes().hex()}
+    found["name"] = run.attributes["name"]
+    found["worn"] = Case.from_attribute(run.attributes["case"]).worn_joint
+    if series and case.steps > 1000:  # of long ones: the text of the case is longer by the key
+        kept = run.with_series(series, case.output.precision, case.output.compress)
+        found["file"] = str(round(len(encode_batch([kept])) / 10_000))
     if case.wear:
         worn = Worn(case)
         begun = worn.make_row([])

@@ -35,7 +35,7 @@ COMBINATIONS = {
     },
     "flores": {**SMALL_END, "contact": {"law": "flores", "restitution": 0.6}},
 }  # fmt: skip
-SHORT = "oil", "lugre", "all"  # SciPy's steps in Python are many
+SHORT = "oil", "lugre", "all", "elastic"  # SciPy's steps in Python are many
 UNDAMPED = "johnson", "liu"  # but for friction
 
 
@@ -54,9 +54,9 @@ def apart(one, other, name="acceleration"):
 @pytest.mark.parametrize("name", COMBINATIONS)
 def test_three_integrators_agree(name):
     """Explicit steps, stiff ones and SciPy's DOP853 share the equations alone."""
-    how, bound = {"duration_rev": 0.06 if name in SHORT else 0.25, "rtol": 1e-8}, 2e-4
+    how, bound = {"duration_rev": 0.05 if name in SHORT else 0.15, "rtol": 1e-8}, 2e-4
     if name in UNDAMPED:
-        how, bound = {"duration_rev": 0.06, "rtol": 1e-10}, 1e-3
+        how, bound = {"duration_rev": 0.05, "rtol": 1e-10}, 1e-3
     runs = [run(COMBINATIONS[name], method=one, **how) for one in ("TSIT5", "RODAS", "DOP853")]
     for one in runs:
         assert float(one.energy_residual) < 1e-5
@@ -71,7 +71,7 @@ def test_an_accuracy_is_kept():
     span = {"duration_rev": 1, "settle_rev": 0.5}
     found = simulate(Case.from_values({**COMBINATIONS["all"], "solve": span}))
     assert found.attrs["promise"] == "kept"
-    exact = run(COMBINATIONS["all"], **span, rtol=1e-9)
+    exact = run(COMBINATIONS["all"], **span, rtol=1e-7)
     settled = found.crank_angle > math.pi
     a, b = (one.acceleration.values[settled] for one in (found, exact))
     assert np.linalg.norm(a - b) / np.linalg.norm(b) < 5e-3

@@ -51,18 +51,18 @@ def test_bars_hold_the_true_average_in_95_of_100_runs(record, count, pull):
     exact = {"rms_acceleration": 10.0, "contact_loss_fraction": 0.3, "impact_count": 20.0 * count,
              "impacts_per_rev": 20.0}  # fmt: skip
     held = dict.fromkeys(exact, 0)
-    for _ in range(200):
+    for _ in range(150):
         each = turns(rng, count, pull)
         numbers = metrics(record, merge_tallies(each))
         bars = chaotic_bars(record, each, numbers)
         for name, value in exact.items():
             held[name] += bool((np.abs(numbers[name] - value) <= bars[name]).all())
-    assert all(180 <= number <= 198 for number in held.values()), held
+    assert all(135 <= number <= 148 for number in held.values()), held
 
 
 def test_revolutions_to_one_percent_are_as_many_as_it_takes(record):
     rng = np.random.default_rng(2)
-    found = [statistics(record, turns(rng, 120))["revolutions_to_one_percent"] for _ in range(20)]
+    found = [statistics(record, turns(rng, 60))["revolutions_to_one_percent"] for _ in range(20)]
     # of the root of 100 +- 10: 5 % each
     assert np.median(found) == pytest.approx(25, rel=0.2)
 
