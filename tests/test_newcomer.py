@@ -94,18 +94,20 @@ def copy(tmp_path_factory):
     return place
 
 
-def run_in(copy, *words):
-    """What Python prints in the copy, which compiles nothing."""
-    environment = os.environ | {"COMPSIM_JIT": "0", "PYTHONPATH": f"{copy}:{copy / 'cmd'}"}
-    ran = subprocess.run(
-        [sys.executable, *words], cwd=copy, capture_output=True, text=True, env=environment
-    )
-    assert ran.returncode == 0, ran.stdout[-3000:] + ran.stderr
-    return ran.stdout
-
-
-METRICS = """
+WORK = """
 import compressor
+import pytest
+from compsim import cli
+from compressor.report.figures import pictures
+
+draw = pictures.render
+def draw_new(figure):
+    is_new = figure.layout.yaxis.title.text == "velocity (m/s)"
+    return draw(figure) if is_new else b"drawn"
+pictures.render = draw_new  # the other pictures are as ever
+for words in ("report -o out", "size -r some", "count big-end", "--help"):
+    assert cli.main(words.split()) == 0, words
+print("metrics")
 solve = {"duration_rev": 0.05, "settle_rev": 0, "accuracy": "draft"}
 values = {"joint": "big_end", "clearance_mm": 0.2, "solve": solve}
 run = compressor.simulate(compressor.Case.from_values(values))
@@ -115,11 +117,29 @@ values = {"drive": {"flywheel_kg_m2": 0.5}, "solve": solve}
 more = compressor.simulate(compressor.Case.from_values(values))
 print(float(more.mean_crank_speed), float(more.crank_speed.mean()))
 print(run.contact_seconds_per_rev.attrs["units"], "mean_crank_speed" in run)
+print("tests")
+which = "contact_laws or herbert_mcwhannell-0.5"
+options = ("-vv", "-p", "no:cacheprovider", "-p", "no:xdist", "-k", which)
+tests = ("tests/physics/test_contact_laws.py", "tests/physics/test_restitution.py")
+assert pytest.main([*options, *tests]) == 0
 """
 
 
-def test_new_metrics_are_measured(copy):
-    *numbers, unit, of_others = run_in(copy, "-c", METRICS).split()
+@pytest.fixture(scope="module")
+def printed(copy, paper_store):
+    """What is printed there: by a report, two verbs and the help; metrics; tests of laws."""
+    part_of(paper_store, copy / "results", "design", "big-end")  # which the figure needs
+    (copy / "some").mkdir()
+    (copy / "some/file").write_text("four", encoding="utf-8")
+    environment = os.environ | {"COMPSIM_JIT": "0", "PYTHONPATH": f"{copy}:{copy / 'cmd'}"}
+    words = [sys.executable, "-c", WORK]  # it compiles nothing
+    ran = subprocess.run(words, cwd=copy, capture_output=True, text=True, env=environment)
+    assert ran.returncode == 0, ran.stdout[-3000:] + ran.stderr
+    return re.split("^(?:metrics|tests)\n", ran.stdout, flags=re.MULTILINE)
+
+
+def test_new_metrics_are_measured(printed):
+    *numbers, unit, of_others = printed[1].split()
     assert (unit, of_others) == ("s", "False")
     seconds, bar, lost, speed, mean = map(float, numbers)
     assert seconds == pytest.approx((1 - lost) * 60 / 500)
@@ -127,32 +147,14 @@ def test_new_metrics_are_measured(copy):
     assert speed == pytest.approx(mean, rel=1e-3)
 
 
-REPORT = """
-import sys
-from compressor.report.figures import pictures
-from compsim import cli
-draw = pictures.render
-def draw_new(figure):
-    is_new = figure.layout.yaxis.title.text == "velocity (m/s)"
-    return draw(figure) if is_new else b"drawn"
-pictures.render = draw_new
-sys.exit(cli.main(["report", "-o", "out"]))
-"""  # the other pictures are as ever
-
-
-def test_a_new_figure_is_in_the_report_and_new_verbs_run(copy, paper_store):
-    part_of(paper_store, copy / "results", "design", "big-end")  # which the figure needs
-    run_in(copy, "-c", REPORT)
+def test_a_new_figure_is_in_the_report_and_new_verbs_run(copy, printed):
     page = (copy / "out/index.html").read_text(encoding="utf-8")
     assert "Velocity against displacement" in page
     assert re.search(r"Greatest velocity: 6\.\d+ m/s", page)
     assert len((copy / "out/figure-17.csv").read_text(encoding="utf-8").splitlines()) > 1000
     assert (copy / "out/figure-17.png").stat().st_size > 10_000
-    (copy / "some").mkdir()
-    (copy / "some/file").write_text("four", encoding="utf-8")
-    assert run_in(copy, "-m", "compsim", "size", "-r", "some") == "4\n"
-    assert run_in(copy, "-m", "compsim", "count", "big-end") == "periodic 3\n"
-    assert "Print how many jobs of a study" in run_in(copy, "-m", "compsim", "--help")
+    assert printed[0].startswith("out/index.html\n4\nperiodic 3\n")
+    assert "Print how many jobs of a study" in printed[0]
 
 
 PASS = (
@@ -164,10 +166,6 @@ PASS = (
 )
 
 
-def test_new_contact_laws_pass_the_tests_of_all_laws(copy):
-    tests = ("tests/physics/test_contact_laws.py", "tests/physics/test_restitution.py")
-    which = "contact_laws or herbert_mcwhannell-0.5"
-    options = ("-vv", "-p", "no:cacheprovider", "-p", "no:xdist", "-k", which)
-    told = run_in(copy, "-m", "pytest", *options, *tests)
+def test_new_contact_laws_pass_the_tests_of_all_laws(printed):
     for name in PASS:
-        assert re.search(rf"::{re.escape(name)} PASSED", told), name
+        assert re.search(rf"::{re.escape(name)} PASSED", printed[2]), name
