@@ -6,15 +6,13 @@ import math
 import numpy as np
 import pytest
 from compsim import screen
-from test_layers import ROOT
 
 from compressor.analysis import cautions, describe_machine
 from compressor.analysis.machine_numbers import USUAL, machine_numbers, revolution_loads
-from compressor.cases import Case, load_studies, with_ideal_joints
+from compressor.cases import Case, with_ideal_joints
 from compressor.physics import COLUMNS, Column, exact_motion, observe_all, segments
 from compressor.solve import record
 
-EXAMPLES = ROOT / "compressor" / "cases" / "examples"
 # a machine of another nameplate, and what a hand calculation has for it
 NAMEPLATE = """
 joint: both
@@ -154,21 +152,6 @@ def test_the_pressure_of_a_bearing_names_its_own_length(given, key, read):
     text = "joint: both\nclearance_mm: 0.05\nmachine: {speed_rpm: 2500, pin_radius_mm: 15}\n"
     remarks = describe_machine(read(text + given)).remarks()
     assert remarks[key].endswith("is usual; bearing length and pin are too small")
-
-
-@pytest.mark.parametrize(
-    "path",
-    [path for path in [*EXAMPLES.glob("*.yaml"), *(ROOT / "configs").glob("*.yaml")]
-     if path.name != "extremes.yaml"],  # which is far from any machine
-    ids=lambda path: path.stem,
-)  # fmt: skip
-def test_no_example_is_remarked_on_or_cautioned(path):
-    few = ["sample.n=2"] * ("sample:" in path.read_text(encoding="utf-8"))
-    few += ["machine.rod_mass_kg=[1.5, 9.3]"] * (path.stem == "claims")  # in place of 20 each
-    for study in load_studies(path, overrides=few):
-        assert describe_machine(study).remarks() == {}
-        odd = {one.key for one in cautions(study)}
-        assert odd == ({"wear"} if path.stem == "life" else set())  # of which a run reads nothing
 
 
 def test_of_many_jobs_both_ends_are_looked_at_and_the_part_is_told(read, capsys):

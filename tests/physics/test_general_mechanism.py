@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 import sympy
+from sympy.printing.pycode import PythonCodePrinter
 
 from compressor.cases.case import Case
 from compressor.metrics import JOINTS
@@ -107,9 +108,10 @@ def lagrange():
     x = bore[0] + length * cos_phi + w[3]
     positions = sympy.Matrix([*places, [x], [w[5]], [sympy.asin(sin_phi)], [w[6]], [w[0]]])
     inertia = sympy.zeros(17)
-    for i, j in itertools.product(range(6), repeat=2):
+    for i, j in itertools.combinations_with_replacement(range(6), 2):
         mean = k["m"] * sympy.integrate(shapes[i] * shapes[j], (s, 0, 1))
-        inertia[2 * i, 2 * j] = inertia[2 * i + 1, 2 * j + 1] = mean
+        for one, other in ((2 * i, 2 * j), (2 * i + 1, 2 * j + 1)):
+            inertia[one, other] = inertia[other, one] = mean
     own = [k["mp"], k["mp"], k["I"] - k["m"] * k["L"] ** 2 / 12, k["Jp"], k["Jc"]]
     for i, one in enumerate(own):
         inertia[12 + i, 12 + i] = one
@@ -124,7 +126,10 @@ def lagrange():
     bias = (jacobian * rates).jacobian(w) * rates
     pushed = [-sympy.diff(stored, one) for one in w]
     parts = jacobian.tolist(), list(bias), inertia.tolist(), pushed
-    evaluate = sympy.lambdify((w, v, tuple(k.values())), parts, modules="math", cse=True)
+    unsorted = PythonCodePrinter({"order": "none", "fully_qualified_modules": False})
+    evaluate = sympy.lambdify(
+        (w, v, tuple(k.values())), parts, modules="math", cse=True, printer=unsorted
+    )
 
     def equations(w, v, p):
         found = evaluate(w, v, [p[name] for name in fields.values()])

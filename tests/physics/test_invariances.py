@@ -27,7 +27,7 @@ from compressor.solve.simulate import measure
 from compressor.sweep.sweep import sweep
 
 pytestmark = pytest.mark.compiled
-FEW = settings(max_examples=40, deadline=None, derandomize=True,
+FEW = settings(max_examples=25, deadline=None, derandomize=True,
                suppress_health_check=[HealthCheck.too_slow])  # fmt: skip
 JOINTS = st.sampled_from(["big_end", "small_end", "both"])
 LOADS = st.sampled_from(["spring", "gas", "none"])
@@ -203,7 +203,7 @@ def test_a_joint_without_clearance_costs_nothing(joint):
 # ---- vanishing clearance
 
 
-@settings(FEW, max_examples=8)
+@settings(FEW, max_examples=6)
 @given(scenes())
 def test_a_clearance_that_vanishes_leaves_the_ideal_machine(values):
     """With the contact scaled along (K as c^-1.5, d_max as c, C_max as c^-0.5) the deviation goes

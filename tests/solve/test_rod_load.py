@@ -82,11 +82,11 @@ CYLINDER = {"action": "double", "rod_diameter_mm": 30, "clearance_percent": 9}
 @pytest.mark.parametrize("joint", ["big_end", "small_end"])
 @pytest.mark.parametrize("load", ["spring", "gas", CYLINDER])
 def test_bars_hold_the_error(joint, load):
-    """Against a run at rtol 1e-11."""
+    """Against a run at rtol 1e-9."""
     values = {"joint": joint, "clearance_mm": 0.2, "load": load, **SIGNALLED}
     values |= {"load": "gas", "gas": load} if load is CYLINDER else {}
     ours = measure(Case.from_values({**values, "solve": {**TURN, "accuracy": "draft"}})).numbers
-    exact = measure(Case.from_values({**values, "solve": {**TURN, "rtol": 1e-11}})).numbers
+    exact = measure(Case.from_values({**values, "solve": {**TURN, "rtol": 1e-9}})).numbers
     for name in NAMES:
         away = abs(ours[name] - exact[name])
         assert away <= ours[f"{name}_error"] + 1e-12 < 0.2 * ours[name], name
@@ -97,9 +97,9 @@ def test_other_methods_find_the_same_sides(method):
     """And by how much a state that is off moves the changes of contact, on which bars rest."""
     ours, theirs = (
         solve(Case.from_values(
-            FLIES | {"solve": {**TURN, "rtol": 1e-7, "error_bars": False, "method": one}}
-        ))
-        for one in ("auto", method)
+            FLIES | {"solve": {"duration_rev": 1.5, "settle_rev": 0.5, "output_step_deg": 0.9,
+                               "rtol": 1e-5, "error_bars": False, "method": one}}
+        )) for one in ("auto", method)
     )  # fmt: skip
     for name in (*NAMES, "contact_loss_fraction"):
         one, other = (np.ravel(found.metrics[name])[-1] for found in (ours, theirs))
