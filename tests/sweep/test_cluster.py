@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from chaos.common import contents, differing
 from compsim.cli import main
-from conftest import wait_for, write_cases
+from conftest import jobs_here, wait_for, write_cases
 
 from compressor.cases.load import load_studies
 from compressor.store import reader as store
@@ -40,16 +40,17 @@ def studies(tmp_path_factory):
     folder = tmp_path_factory.mktemp("studies")
     solve = {"duration_rev": 2, "accuracy": "draft", "error_bars": False, "output_step_deg": 0.9}
     many = {"joint": "big_end", "output": {"keep": "metrics"}, "solve": solve,
-            "clearance_mm": {"linspace": [0.1, 0.3, 60]}}  # fmt: skip
-    few = {"joint": "small_end", "clearance_mm": {"linspace": [0.1, 0.3, 10]}, "solve": solve}
+            "clearance_mm": {"linspace": [0.1, 0.3, 31]}}  # fmt: skip
+    few = {"joint": "small_end", "clearance_mm": {"linspace": [0.1, 0.3, 5]}, "solve": solve}
     return load_studies(*write_cases(folder, many=many, few=few))
 
 
 @pytest.fixture(scope="module")
 def locally(studies, tmp_path_factory):
-    """What is stored of the studies' jobs by a process of this machine."""
+    """What is stored of the studies' jobs by this process."""
     folder = tmp_path_factory.mktemp("local")
-    sweep(studies, folder, 1)
+    with jobs_here():
+        sweep(studies, folder, 1)
     return contents(folder)
 
 
@@ -76,7 +77,8 @@ def test_workers_with_other_programs_are_refused(dask, studies, tmp_path, monkey
         sweep(studies[1:], tmp_path / "out", options=Options(backend=backend))
 
 
-def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path):
+def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "CONNECT_SECONDS", 1.0)
     told = []
     with distributed.LocalCluster(
         n_workers=0, processes=False, dashboard_address=":0", silence_logs=50
@@ -93,7 +95,7 @@ def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path)
 
 
 def test_no_scheduler_is_a_mistake(studies, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(cluster, "CONNECT_SECONDS", 1.0)
+    monkeypatch.setattr(cluster, "CONNECT_SECONDS", 0.1)
     options = ["--scheduler", "tcp://127.0.0.1:1"]
     assert main(["run", studies[0].path, "-r", str(tmp_path / "out"), *options]) == 2
     assert "no scheduler answers" in capsys.readouterr().err
@@ -101,7 +103,7 @@ def test_no_scheduler_is_a_mistake(studies, tmp_path, capsys, monkeypatch):
 
 
 def test_sigterm_keeps_what_is_finished_and_cancels_the_rest(dask, tmp_path):
-    values = {"joint": "big_end", "clearance_mm": {"linspace": [0.1, 0.3, 5000]},
+    values = {"joint": "big_end", "clearance_mm": {"linspace": [0.1, 0.3, 3000]},
               "output": {"keep": "metrics"}}  # fmt: skip
     (config,) = write_cases(tmp_path, long=values)
     out = tmp_path / "out"
@@ -113,31 +115,21 @@ def test_sigterm_keeps_what_is_finished_and_cancels_the_rest(dask, tmp_path):
     _, told = running.communicate(timeout=20)
     assert running.returncode == 143, told
     assert "interrupted by SIGTERM" in told
-    assert 0 < len(store.read_store(out).keys()) < 5000
+    assert 0 < len(store.read_store(out).keys()) < 3000
     assert not list(out.glob("batches/.*"))
     wait_for(lambda: not dask.scheduler.tasks)
 
 
-def test_a_worker_that_is_killed_costs_nothing_and_a_job_that_fells_its_own_is_lost_alone(
-    dask, studies, locally, tmp_path, monkeypatch
-):
-    """The last test, since it costs the workers."""
+def test_a_job_that_fells_its_worker_is_lost_alone(dask, studies, locally, tmp_path, monkeypatch):
+    """The last test, since it costs the workers, one of them amid jobs that run elsewhere then."""
     monkeypatch.setattr(dask.scheduler, "allowed_failures", 0)
     monkeypatch.setattr(cluster, "run_job", bad_jobs.harmful)
     monkeypatch.setattr(cluster, "run_cases", bad_jobs.run_harmful_cases)
-    victim = dask.workers[0].process.pid
     with connect_cluster(dask.scheduler_address) as backend:
-
-        def killing(*arguments):
-            for number, end in enumerate(backend(*arguments)):
-                if number == 0:  # before a job fells one
-                    os.kill(victim, signal.SIGKILL)
-                yield end
-
-        summary = sweep(studies, tmp_path / "out", options=Options(backend=killing))
-    assert summary.run_now == 70
+        summary = sweep(studies, tmp_path / "out", options=Options(backend=backend))
+    assert summary.run_now == 36
     (lost,) = summary.failed
-    assert lost.coordinates["clearance_mm"] == pytest.approx(0.2017, abs=0.001)
+    assert lost.coordinates["clearance_mm"] == pytest.approx(0.2)
     assert lost.reason == "worker_died"
     assert lost.detail == "it felled 1 workers of the cluster that had it alone"
     found = tmp_path / "out"

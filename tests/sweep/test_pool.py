@@ -61,15 +61,6 @@ def nothing_is_said(capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_no_more_processes_start_than_there_are_jobs(monkeypatch):
-    started = []
-    start = pool.Worker.__init__
-    monkeypatch.setattr(pool.Worker, "__init__", lambda *a: (started.append(1), start(*a))[1])
-    assert results(run_batches(work, named(range(2)), Workers(12))) == {0: 0, 1: 1}
-    assert list(run_batches(work, [], Workers())) == []
-    assert len(started) <= 2
-
-
 def test_jobs_are_read_as_they_are_needed():
     issued = itertools.count()
     jobs = ((n, 0.01, 9.0) for n in issued)
@@ -79,38 +70,49 @@ def test_jobs_are_read_as_they_are_needed():
     ends.close()
 
 
-def test_a_worker_has_none_of_our_files_and_one_thread(tmp_path, monkeypatch):
+def test_workers_are_few_with_none_of_our_files_and_one_thread(tmp_path, monkeypatch):
     """A lock that we hold would else outlive us in a worker; what it prints is no data."""
+    started, start = [], pool.Worker.__init__
+    monkeypatch.setattr(pool.Worker, "__init__", lambda *a: (started.append(1), start(*a))[1])
     monkeypatch.setenv("OMP_NUM_THREADS", "8")
     names = ["files", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"]
     with open(tmp_path / "lock", "w") as lock:
         os.set_inheritable(lock.fileno(), True)
         fcntl.flock(lock, fcntl.LOCK_EX)
-        files, *threads = results(run_batches(bad_jobs.look, named(names), Workers(1))).values()
+        found = results(run_batches(bad_jobs.look, named(names), Workers(12)))
+    files, *threads = (found[name] for name in names)
     assert not [name for name in files if "lock" in name]
     assert files[0] == os.devnull
     assert files[1] == files[2]
     assert threads == ["1", "1"]
+    assert list(run_batches(work, [], Workers())) == []
+    assert len(started) <= len(names)
 
 
 def test_what_is_prepared_is_not_timed(tmp_path):
     jobs = [(n, n, 0.5) for n in range(4)]
-    rules = Workers(2, partial(bad_jobs.prepare, tmp_path, 1.5), grace=0.2)
+    rules = Workers(2, partial(bad_jobs.prepare, tmp_path, 1.0), grace=0.2)
     ends = list(run_batches(partial(bad_jobs.is_prepared, tmp_path), jobs, rules))
     assert results(ends) == dict.fromkeys(range(4), True)
 
 
-DEADLY = ("killed", "hang", "crash", "leave", "stop", "bomb")
+DEADLY = ("crash", "hang", "killed", "leave", "stop", "bomb")
 RAISING = tuple(name for name, (_, reason, _) in POISON.items() if reason == "internal_error")
 
 
 @pytest.mark.parametrize(
-    ("names", "workers"), [(DEADLY[:2], 1), (DEADLY[2:] + RAISING, 2)]
-)  # one worker: joblib works in the calling thread
-def test_a_poison_job_costs_itself_only(names, workers):
+    ("names", "workers", "ignored"),  # one worker: joblib works in the calling thread
+    [(DEADLY[:2], 1, signal.SIGCHLD), (DEADLY[2:] + RAISING, 2, signal.SIGHUP)],
+)
+def test_a_poison_job_costs_itself_only(names, workers, ignored):
+    """SIGCHLD that our starter ignores is inherited, and would keep exit codes from us."""
     first, *others = names
     jobs = named([*range(60), first, *range(60, 90), *others, *range(90, 120)])
-    ends = list(run_batches(work, jobs, Workers(workers, **RULES)))
+    former = signal.signal(ignored, signal.SIG_IGN)
+    try:
+        ends = list(run_batches(work, jobs, Workers(workers, **RULES)))
+    finally:
+        signal.signal(ignored, former)
     assert len(ends) == 120 + len(names)
     assert results(ends) == {n: n for n in range(120)}
     assert {*lost(ends)} == {*names}
@@ -124,14 +126,14 @@ def test_a_poison_job_costs_itself_only(names, workers):
 
 def test_a_job_may_succeed_when_it_is_tried_again(tmp_path):
     """An outsider may have killed its worker; of the other batches no job runs twice."""
-    crash_once = partial(bad_jobs.crash_once, tmp_path, 100)
-    ends = list(run_batches(crash_once, named(range(200)), Workers(2, target_seconds=0.1)))
-    assert results(ends) == {n: n for n in range(200)}
-    runs = {n: len((tmp_path / str(n)).read_text()) for n in range(200)}
-    assert runs[100] == 2
+    crash_once = partial(bad_jobs.crash_once, tmp_path, 50)
+    ends = list(run_batches(crash_once, named(range(100)), Workers(2, target_seconds=0.1)))
+    assert results(ends) == {n: n for n in range(100)}
+    runs = {n: len((tmp_path / str(n)).read_text()) for n in range(100)}
+    assert runs[50] == 2
     again = [n for n, count in runs.items() if count > 1]
     assert max(runs.values()) == 2
-    assert 100 - min(again) <= 20  # those of its batch before it
+    assert 50 - min(again) <= 20  # those of its batch before it
 
 
 SCRIPT = """
@@ -158,11 +160,11 @@ def test_a_worker_s_time_stands_still_with_ours(tmp_path):
     """All are stopped, as by Ctrl-Z, for longer than the job may take."""
     running, _ = started(tmp_path, """
 sleep = functools.partial(bad_jobs.announced, do=time.sleep)
-for end in run_batches(sleep, [(n, 1.0, 1.5) for n in range(2)], Workers(2, grace=0.5)):
+for end in run_batches(sleep, [(n, 0.5, 0.8) for n in range(2)], Workers(2, grace=0.5)):
     print(end)
 """)  # fmt: skip
     os.killpg(running.pid, signal.SIGSTOP)
-    time.sleep(2.5)
+    time.sleep(1.5)
     os.killpg(running.pid, signal.SIGCONT)
     said, _ = running.communicate(timeout=60)
     assert said.count("reason=''") == 2
@@ -174,7 +176,7 @@ for end in run_batches(sleep, [(n, 1.0, 1.5) for n in range(2)], Workers(2, grac
      (bad_jobs.refuse, "MemoryError: no room for machine code")],
 )  # fmt: skip
 def test_workers_that_cannot_begin_end_the_call_and_say_why(prepare, why, monkeypatch):
-    monkeypatch.setattr(pool, "MAX_FRUITLESS", 2)
+    monkeypatch.setattr(pool, "MAX_FRUITLESS", 0)
     with pytest.raises(WorkersFailed, match=f"jobs could not even begin: {why}"):
         list(run_batches(work, named(range(100)), Workers(1, prepare)))
 
@@ -195,21 +197,20 @@ def stored(folder, payloads, **more):
     return list(run_batches(work, jobs, rules, partial(bad_jobs.store, folder)))
 
 
-def test_a_batch_is_stored_once_by_its_worker(tmp_path):
+def test_a_batch_is_stored_once_by_its_worker_and_what_cannot_be_costs_itself_only(tmp_path):
     """What jobs crash of it runs again, and is stored once."""
-    found = results(stored(tmp_path, [*range(100), "crash", *range(100, 200)]))
-    lines = [line for path in tmp_path.iterdir() for line in path.read_text().split()]
-    assert sorted(map(int, lines)) == [*range(200)]
-    assert {*found.values()} == {path.name for path in tmp_path.iterdir()}
-    assert len({*found.values()}) < 50
-
-
-def test_a_job_that_cannot_be_stored_costs_itself_only(tmp_path):
-    ends = stored(tmp_path, [*range(40), "unstorable", *range(40, 80), "deadly", *range(80, 120)])
-    assert len(results(ends)) == 120
-    assert {n: end.reason for n, end in lost(ends).items()} == {
-        40: "out_of_memory", 81: "worker_died",
+    numbers = [*range(220)]
+    payloads = [*numbers[:100], "crash", *numbers[100:200], "unstorable", *numbers[200:210]]
+    payloads += ["deadly", *numbers[210:]]
+    ends = stored(tmp_path, payloads)
+    assert {payloads[n]: end.reason for n, end in lost(ends).items()} == {
+        "crash": "worker_died", "unstorable": "out_of_memory", "deadly": "worker_died",
     }  # fmt: skip
+    assert sorted(payloads[n] for n in results(ends)) == numbers
+    first = {n: name for n, name in results(ends).items() if n < 100}  # away from those others
+    lines = [(int(n), path.name) for path in tmp_path.iterdir() for n in path.read_text().split()]
+    assert sorted(line for line in lines if line[0] < 100) == sorted(first.items())
+    assert len({*first.values()}) < 25
 
 
 def test_a_disk_that_is_full_ends_the_call(tmp_path):
@@ -231,40 +232,25 @@ def test_closing_ends_the_workers():
     assert list(ends) == []
 
 
-def test_workers_are_made_anew_where_their_loader_has_died():
-    """Its copies die with it; what they had begun runs again."""
-    before, ends = children(), run_batches(work, named(range(300)), Workers(2, target_seconds=0.01))
+def test_workers_are_made_anew_where_their_loader_dies(tmp_path, monkeypatch):
+    """While all wait for it, and later with its copies: what they had begun runs again."""
+    monkeypatch.setattr(pool, "MAX_FRUITLESS", 2)
+    rules = Workers(3, partial(bad_jobs.die_first, tmp_path), target_seconds=0.01)
+    before, ends = children(), run_batches(work, named(range(300)), rules)
     found = [next(ends)]
     (loader,) = children() - before
     os.kill(loader, signal.SIGKILL)
     assert results([*found, *ends]) == {n: n for n in range(300)}
 
 
-def test_a_loader_that_dies_while_all_wait_for_it_is_made_anew(tmp_path):
-    rules = Workers(12, partial(bad_jobs.die_first, tmp_path))
-    assert results(run_batches(work, named(range(60)), rules)) == {n: n for n in range(60)}
-
-
-def test_a_worker_s_end_is_known_where_our_starter_ignores_it():
-    """SIGCHLD that is ignored is inherited, and would keep exit codes from us."""
-    former = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
-    try:
-        ends = list(run_batches(work, named([1, "crash", 2]), Workers(1, **RULES)))
-    finally:
-        signal.signal(signal.SIGCHLD, former)
-    assert results(ends) == {1: 1, 2: 2}
-    assert [end.reason for end in lost(ends).values()] == ["worker_died"]
-
-
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
-def test_no_process_outlives_its_parent(number, tmp_path):
+def test_no_process_outlives_its_parent(tmp_path):
     """A script without a guard: workers do not run the caller's main module."""
     parent, pids = started(tmp_path, """
 jobs = [(name, name, 1e9) for name in ("hang", "stop")]
 list(run_batches(bad_jobs.announced, jobs, Workers(2)))
 """)  # fmt: skip
     assert all(map(is_running, pids))
-    parent.send_signal(number)
+    parent.kill()
     parent.wait(60)
     wait_for(lambda: not any(map(is_running, pids)))
     assert parent.communicate(timeout=60) == ("", "")  # until the last process of all has ended
