@@ -379,10 +379,12 @@ def jobs_here():
 @contextlib.contextmanager
 def without_pictures():
     """Reports have all but their pictures, of which each takes a quarter of a second."""
+    from compressor.report import plots
     from compressor.report.figures import pictures
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pictures, "render", lambda drawing: b"drawn")
+        for module in (pictures, plots):
+            patch.setattr(module, "render", lambda *drawing: b"drawn")
         yield
 
 

@@ -137,7 +137,7 @@ CASE = {
     "gas": {"switching": "exact"},
     "body": True,
     "sensor": {"rate_Hz": 2560, "mounting_Hz": 2500, "noise_m_per_s2": 0.001, "length_rev": 8},
-    "solve": {"duration_rev": 2},
+    "solve": {"duration_rev": 2, "error_bars": False},
 }  # fmt: skip
 TRUTH = {"machine.reciprocating_mass_kg": 16.0, "body.mass_kg": 450.0}
 FIT = ["--fit", "machine.reciprocating_mass_kg=10:20", "--fit", "body.mass_kg=300:600"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from compsim import cli
-from conftest import assert_same_bits, jobs_here
+from conftest import assert_same_bits, jobs_here, without_pictures
 
 from compressor.cases import CaseFileError
 from compressor.store import write_dataset
@@ -38,7 +38,7 @@ def place(tmp_path_factory):
     place = tmp_path_factory.mktemp("follow")
     path = write(place / "worn.yaml")
     words = ["follow", path, "--over", OVER, "--both", "--no-exponent", "--points", "8", "--quiet"]
-    with jobs_here():
+    with jobs_here(), without_pictures():
         assert cli.main([*words, "-r", str(place / "r"), "-j", "2"]) == 0
     return place
 
@@ -96,7 +96,8 @@ def test_a_chain_goes_on_alone_from_its_last_value_and_ends_in_the_same_bits(
     after = run_value(chain.cases[1], rows[0]["end_state"], chain.points, chain.exponent)
     np.testing.assert_array_equal(after["end_state"], rows[1]["end_state"])
     write_dataset(path, chain.to_dataset(rows[:2]))
-    said = follow_again().err
+    with without_pictures():
+        said = follow_again().err
     assert "1 value run in" in said
     assert "11 were stored before" in said
     assert len(others) == 3
@@ -111,7 +112,8 @@ def test_values_that_a_machine_does_not_have_are_missing(in_process, tmp_path):
     )
     words = ["--over", OVER, "--no-exponent", "--points", "6", "--quiet", "-j", "1",
              "--only", "machine.rod_mass_kg < 5"]  # fmt: skip
-    assert cli.main(["follow", path, "-r", str(tmp_path), *words]) == 0
+    with without_pictures():
+        assert cli.main(["follow", path, "-r", str(tmp_path), *words]) == 0
     found = xr.load_dataset(tmp_path / "follow/two-clearance_mm.nc")
     assert found["status"].values.tolist() == [[["ok"] * 3], [["ok", "ok", "missing"]]]
     assert np.isnan(found["period"].values[1, 0, 2])
