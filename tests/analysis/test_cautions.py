@@ -1,6 +1,7 @@
 """Warnings before a run: what is odd, told once, and nothing else; scales by closed forms."""
 
 import json
+import sys
 
 import numpy as np
 import page_tables
@@ -116,15 +117,15 @@ def test_a_unit_is_told_of_once_and_in_place_of_what_follows_from_it(read):
     assert cautions(read(text)) == [Caution(stiffness, told, 2, 2)]
 
 
-def test_a_large_sweep_is_sampled_evenly_and_always_the_same(read):
+def test_a_large_sweep_is_sampled_evenly_and_always_the_same(read, monkeypatch):
+    monkeypatch.setattr(sys.modules["compressor.analysis.cautions"], "MAX_JOBS", 100)
     many = read(
         "joint: big_end\nclearance_mm: {linspace: [0.2, 0.4, 20]}\n"
-        "machine: {speed_rpm: [500, 20000], rod_mass_kg: {linspace: [3, 5, 25]}}\n",
-        max_jobs=10**6,
+        "machine: {speed_rpm: [500, 20000], rod_mass_kg: {linspace: [3, 5, 5]}}\n"
     )
     (deep, *_) = found = cautions(many)
     assert found == cautions(many)
-    assert 500 <= deep.of <= 502
+    assert 100 <= deep.of <= 102
     assert 0.4 < deep.jobs / deep.of < 0.6
 
 

@@ -87,13 +87,12 @@ def test_known_pulses_are_found(clearance, begin, end, rtol):
     assert (rows[near, Column.NORMAL] > 0).any()
 
 
-@pytest.mark.parametrize("clearance", [0.2, 0.3])
-def test_pulses_decide_the_accuracy(clearance):
+def test_pulses_decide_the_accuracy():
     params = reference.paper_params(
-        "gas", "big_end", clearance * 1e-3, rod_mass=3.0, rod_inertia=3 * 0.36 / 12,
+        "gas", "big_end", 0.3e-3, rod_mass=3.0, rod_inertia=3 * 0.36 / 12,
         reciprocating_mass=6.0,
     )  # fmt: skip
-    asked = request(1e-7, 0.1, clearance_mm=clearance, **PULSES)
+    asked = request(1e-7, 0.1, clearance_mm=0.3, **PULSES)
     truth = reference.reference_solution(params, "big_end", asked.times, rtol=1e-10)
     found = accelerations(asked.p, integrate(asked))
     assert np.linalg.norm(found - truth) / np.linalg.norm(truth) < 1e-4

@@ -12,7 +12,7 @@ from compressor.physics.observe import COLUMNS, Column
 from compressor.physics.systems import derivative, observe_at
 from compressor.solve.si_record import record
 
-STATES = 400
+STATES = 240
 SCENES = ("big_end", "small_end", "both")
 LOADS = ("spring", "gas", "none")
 

@@ -26,7 +26,7 @@ NAMEPLATE = {
         "discharge_MPa": 1.0413, "back_pressure_MPa": 0.101, "exponent": 1.27,
     },
     "contact": {"materials": ["steel", "copper"]},
-    "solve": {"duration_rev": 3, "settle_rev": 2},
+    "solve": {"duration_rev": 3, "settle_rev": 2, "error_bars": False},
 }  # fmt: skip
 
 

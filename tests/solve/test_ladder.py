@@ -81,7 +81,7 @@ def test_an_ill_conditioned_case_is_run_tighter_until_it_keeps_its_word(word, as
 
 
 def test_a_promise_that_cannot_be_kept_is_told_with_the_numbers():
-    found = measure(of(CHAOTIC, accuracy="standard", horizon=False))
+    found = measure(of(CHAOTIC, accuracy="standard", horizon=False, duration_rev=2))
     assert (found.status, found.reason) == ("failed", "accuracy_not_reached")
     assert found.attributes["promise"] == "none"
     assert found.detail.startswith("acceleration: its error may be ")
@@ -120,7 +120,7 @@ def test_later_runs_that_agree_by_chance_keep_no_promise(case):
     found = solve(case)
     assert found.promise == "kept" or found.regime == "chaotic"
     if found.promise == "kept":
-        exact = run_module.run_at_tolerance(case, TIGHTEST, 60.0, False)
+        exact = run_module.run_at_tolerance(case, 1e-10, 60.0, False)
         assert distances(exact.samples, found.samples)["acceleration"] <= case.promise
 
 
@@ -145,7 +145,7 @@ def test_a_failed_companion_leaves_errors_unknown(monkeypatch):
 
 @pytest.mark.parametrize("values", TWO)
 def test_a_number_is_reached_truly_and_a_looser_one_costs_less(values):
-    truth = measure(of(values, **SHORT, rtol=1e-11, error_bars=False)).numbers
+    truth = measure(of(values, **SHORT, rtol=1e-10, error_bars=False)).numbers
     steps = []
     for target in (1e-2, 1e-4, 1e-6):
         found = measure(of(values, **SHORT, accuracy={"peak_acceleration": target}))
