@@ -292,7 +292,7 @@ def worn(once):
 
 
 STRUCK = {"none": (), "big_end": (90,), "small_end": (330,), "both": (90, 330)}  # degrees
-WORN_JOBS = 240
+WORN_JOBS = 208
 TURN = 0.12  # s
 
 

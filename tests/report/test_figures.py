@@ -28,8 +28,13 @@ JOINTS = {9: ("big_end", "big_end"), 12: ("small_end", "small_end"),
 
 
 @pytest.fixture(scope="module")
-def drawn(paper_runs):
-    return {number: figure.make(paper_runs).figure for number, figure in FIGURE.items()}
+def made(paper_runs):
+    return {number: shown(number, paper_runs) for number in FIGURE}
+
+
+@pytest.fixture(scope="module")
+def drawn(made):
+    return {number: one.figure for number, one in made.items()}
 
 
 def lines(panel):
@@ -252,8 +257,8 @@ def wild():
 
 
 @pytest.mark.parametrize("number", FIGURE)
-def test_a_caption_is_a_sentence_and_numbers(paper_runs, number):
-    found = shown(number, paper_runs)
+def test_a_caption_is_a_sentence_and_numbers(made, number):
+    found = made[number]
     assert re.fullmatch(r"[A-Z(].*[a-z]\.", found.sentence, re.DOTALL)
     assert found.numbers
     assert all(NUMBER.search(text) for _, text in found.numbers)
@@ -261,9 +266,9 @@ def test_a_caption_is_a_sentence_and_numbers(paper_runs, number):
 
 
 @pytest.mark.parametrize(("number", "fault"), RESPONSES.items())
-def test_peaks_lost_contact_and_differences_are_the_runs(paper_runs, wild, number, fault):
+def test_peaks_lost_contact_and_differences_are_the_runs(made, paper_runs, wild, number, fault):
     for runs in (paper_runs, wild):
-        found = shown(number, runs)
+        found = shown(number, wild) if runs is wild else made[number]
         worn = [runs[label(fault, c)] for c in CLEARANCES]
         peaks = [float(run["peak_acceleration"]) for run in worn]
         assert told(found, "greatest acceleration") == pytest.approx(peaks, rel=1e-3)
@@ -283,28 +288,27 @@ def test_peaks_lost_contact_and_differences_are_the_runs(paper_runs, wild, numbe
 
 
 @pytest.mark.parametrize(("number", "where"), JOINTS.items())
-def test_forces_are_those_of_the_joint(paper_runs, number, where):
-    fault, joint = where
-    found = shown(number, paper_runs)
+def test_forces_are_those_of_the_joint(made, paper_runs, number, where):
+    (fault, joint), found = where, made[number]
     runs = [paper_runs[label(fault, c)]["peak_contact_force_axis"] for c in CLEARANCES]
     for axis, words in (("x", "along the cylinder"), ("y", "across it")):
         peaks = [float(run.sel(joint=joint, axis=axis)) / 1e3 for run in runs]
         assert told(found, words) == pytest.approx(peaks, rel=1e-3)
 
 
-def test_loads_are_told_by_their_peaks_and_corners(paper_runs):
-    found = shown(7, paper_runs)
+def test_loads_are_told_by_their_peaks_and_corners(made, paper_runs):
+    found = made[7]
     assert told(found, "force of the spring") == [3.345]
     assert told(found, "force of the gas") == [3.087]
     assert told(found, "corners of the spring") == [84.26, 180.0, 275.74]
-    assert told(shown(6, paper_runs), "greatest difference") == [0.0] * 3
+    assert told(made[6], "greatest difference") == [0.0] * 3
     moved = paper_runs["typical"].assign(velocity=1.01 * paper_runs["typical"]["velocity"])
     assert told(shown(6, {**paper_runs, "typical": moved}), "greatest difference")[1] > 0.1
 
 
 @pytest.mark.parametrize(("number", "joint"), [(10, "big_end"), (13, "small_end")])
-def test_a_relation_is_told_by_its_numbers(paper_runs, number, joint):
-    found, fits = shown(number, paper_runs), []
+def test_a_relation_is_told_by_its_numbers(made, paper_runs, number, joint):
+    found, fits = made[number], []
     for size in SIZES:
         run = paper_runs[f"{joint} {size}"].isel(time=SETTLED)
         a, force = (
@@ -317,13 +321,13 @@ def test_a_relation_is_told_by_its_numbers(paper_runs, number, joint):
         assert told(found, words) == pytest.approx(values, rel=1e-3)
 
 
-def test_the_cam_and_the_gas_are_told_by_their_numbers(paper_runs):
-    found = shown(4, paper_runs)
+def test_the_cam_and_the_gas_are_told_by_their_numbers(made):
+    found = made[4]
     assert told(found, "as printed") == [208.7, 81.28]
     assert told(found, "closed cam") == [120.0]
     assert told(found, "same from") == [294.0]
-    assert told(shown(3, paper_runs), "phases") == [38.95, 180.0, 294.2]
-    assert told(shown(3, paper_runs), "off the") == [0.2]
+    assert told(made[3], "phases") == [38.95, 180.0, 294.2]
+    assert told(made[3], "off the") == [0.2]
     exact = simulate(Case.from_values({"load": "gas", "gas": {"switching": "exact"}}))
     assert told(shown(3, {"typical": exact}), "off the") == [0.0]
 

@@ -262,8 +262,8 @@ def test_the_table_has_the_first_alarm_of_each_joint_first(written):
     folder, out = written
     found = read_dataset(folder / "alarms.nc")
     for line in (
-        "study: worn", "sound machines: 60 jobs of 60 draws", "worn machines: 180 jobs",
-        "windows: 2 revolutions", "limits: for 1.6 % of false alarms", alarms.CAPTION,
+        "study: worn", "sound machines: 52 jobs of 52 draws", "worn machines: 156 jobs",
+        "windows: 2 revolutions", "limits: for 1.9 % of false alarms", alarms.CAPTION,
     ):  # fmt: skip
         assert f"{line}\n" in out
     assert "  limit / usual  " in out
