@@ -12,7 +12,8 @@ from chaos import common, power
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["faults", "power"])
 def test_nothing_fails_in_a_sample(name, monkeypatch):
-    monkeypatch.setattr(power, "JOBS", {"metrics": 200, "series": 3})
+    monkeypatch.setattr(power, "JOBS", {"metrics": 100, "series": 3})
+    monkeypatch.setattr(power, "MAX_SECONDS", 0.2)
     found = measure_chaos.run(name, 1)
     if "skipped" in found:
         pytest.skip(found["skipped"])

@@ -21,6 +21,7 @@ from compressor.cases.load import load_cases
 from compressor.program import duration
 from compressor.store import reader as store
 from compressor.store.studies import read_studies
+from compressor.studies.tradeoff import variants
 
 
 @pytest.fixture
@@ -190,7 +191,7 @@ def test_explain_tells_cost_and_what_is_paid_for(case_file, compsim):
     )
 
 
-def test_tradeoff_stores_draws_and_lists(case_file, compsim):
+def test_tradeoff_stores_draws_and_lists(case_file, compsim, monkeypatch):
     import xarray as xr
 
     case_file("a.yaml", joint=["big_end", "both"], clearance_mm=0.2, solve={"duration_rev": 0.1})
@@ -207,12 +208,15 @@ def test_tradeoff_stores_draws_and_lists(case_file, compsim):
     for kind in ("png", "svg", "nc"):
         assert f"kept/tradeoff/a-tradeoff.{kind}\n" in out
         assert Path(f"kept/tradeoff/a-tradeoff.{kind}").exists()
+    monkeypatch.setattr("compressor.report.plots.render", lambda *_: b"")
     assert compsim(*words).out == out  # all of it was stored
 
 
 def test_explain_models_prints_what_moves_metrics(case_file, compsim, monkeypatch):
-    """Without laws and mechanisms, which take a minute to compile: test_tradeoff has them."""
-    monkeypatch.setattr("compressor.studies.tradeoff.variants.other_models", lambda *of: [])
+    """Six numbers in doubt, and no laws and mechanisms, which compile: test_tradeoff has them."""
+    few, vary = "compressor.studies.tradeoff.variants.%s", variants.vary_numbers
+    monkeypatch.setattr(few % "vary_numbers", lambda *of: [*vary(*of)][:6])
+    monkeypatch.setattr(few % "other_models", lambda *of: [])
     case_file("worn.yaml", joint="big_end", clearance_mm=[0.2, 0.3], solve={"duration_rev": 0.1})
     out = compsim("explain", "--models", "worn.yaml", "-r", "kept").out
     assert out.startswith("worn, clearance_mm = 0.3\n")
