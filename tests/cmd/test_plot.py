@@ -23,7 +23,7 @@ SOLVE = {"duration_rev": 3, "settle_rev": 1, "accuracy": "draft", "output_step_d
          "error_bars": False}  # fmt: skip
 CASES = {
     "worn": {"joint": "big_end", "clearance_mm": [0.1, 0.3], "friction": False,
-             "contact": {"damping_N_s_per_mm": 10},
+             "contact": {"damping_N_s_per_mm": 100},
              "machine": {"speed_rpm": [400, 500], "rod_mass_kg": 1}},
     "ideal": {"load": "gas"},
     "halted": {"joint": "big_end", "clearance_mm": 0.1, "solve": {"max_steps": 100}},

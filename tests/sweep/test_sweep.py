@@ -23,7 +23,7 @@ from compressor.sweep.worker import attempt
 SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 
 BOTH = {"joint": "both", "clearance_mm": 0.1}
-LATE = {**BOTH, "solve": {"method": "DOP853", "timeout_s": 1e-9}}  # out of time at its first step
+LATE = {**BOTH, "solve": {"method": "DOP853", "timeout_s": 1e-9, "duration_rev": 0.05}}  # at once
 
 
 def statuses(folder, study):
@@ -63,7 +63,7 @@ def test_where_studies_share_a_job_the_greater_demand_counts(studies):
         assert (case.solve.error_bars, case.solve.horizon) == (True, True)
 
 
-@pytest.mark.parametrize("damage", [lambda _: b"", lambda data: data[:-9], lambda data: data[:999]])
+@pytest.mark.parametrize("damage", [lambda _: b"", lambda data: data[:-9]])
 @pytest.mark.parametrize("kind", ["batches", "studies"])
 def test_damage_is_mended_by_the_same_run(kind, damage, studies, tmp_path, in_process):
     made = studies(one={"load": ["none", "spring"]})
@@ -193,14 +193,14 @@ def test_an_interrupted_sweep_keeps_its_jobs_and_goes_on(studies, tmp_path, in_p
         if done:
             raise KeyboardInterrupt
 
-    made = studies(one={**BOTH, "machine": {"rod_mass_kg": {"linspace": [4, 7, 9]}}})
+    made = studies(one={**BOTH, "machine": {"rod_mass_kg": {"linspace": [4, 7, 4]}}})
     with pytest.raises(KeyboardInterrupt):
         sweep(made, tmp_path / "out", 1, stop)
     keys = store.read_store(tmp_path / "out").keys()
     before = {key: store.read_job(tmp_path / "out", key).seconds.item() for key in keys}
-    assert 0 < len(before) < 9
+    assert 0 < len(before) < 4
     summary = sweep(made, tmp_path / "out", 1)
-    assert (summary.done_before, summary.run_now) == (len(before), 9 - len(before))
+    assert (summary.done_before, summary.run_now) == (len(before), 4 - len(before))
     for key, seconds in before.items():  # none has run again
         assert store.read_job(tmp_path / "out", key).seconds.item() == seconds
 
