@@ -22,18 +22,17 @@ TURN = 0.1  # s
 
 def turns(rng, count, pull=0.0):
     """Tallies of revolutions whose mean square acceleration follows a walk about 100."""
-    level, found = 0.0, []
-    for _ in range(count):
-        level = pull * level + math.sqrt(1 - pull**2) * rng.normal()
-        tally = new_tally()
-        tally.seconds = tally.steady_seconds = TURN
-        tally.square[:] = 0.1 * (100.0 + 10.0 * level), 0.1 * 25.0
-        tally.peak[:] = rng.exponential(size=tally.peak.shape)
-        tally.max_penetration[:] = 1e-6
-        tally.loss_seconds[:] = 0.1 * (0.3 + 0.02 * rng.normal())
-        tally.impacts[:] = rng.poisson(20.0)
-        found.append(tally)
-    return found
+    levels = [0.0]
+    for change in rng.normal(size=count):
+        levels.append(pull * levels[-1] + math.sqrt(1 - pull**2) * change)
+    found = np.rec.array(np.repeat(new_tally(), count))
+    found.seconds = found.steady_seconds = TURN
+    found.square[:, 0], found.square[:, 1] = 0.1 * (100.0 + 10.0 * np.array(levels[1:])), 0.1 * 25.0
+    found.peak = rng.exponential(size=found.peak.shape)
+    found.max_penetration = 1e-6
+    found.loss_seconds = 0.1 * (0.3 + 0.02 * rng.normal(size=(count, 1)))
+    found.impacts = rng.poisson(20.0, size=(count, 1))
+    return [*found]
 
 
 @pytest.fixture
@@ -51,13 +50,13 @@ def test_bars_hold_the_true_average_in_95_of_100_runs(record, count, pull):
     exact = {"rms_acceleration": 10.0, "contact_loss_fraction": 0.3, "impact_count": 20.0 * count,
              "impacts_per_rev": 20.0}  # fmt: skip
     held = dict.fromkeys(exact, 0)
-    for _ in range(150):
+    for _ in range(100):
         each = turns(rng, count, pull)
         numbers = metrics(record, merge_tallies(each))
         bars = chaotic_bars(record, each, numbers)
         for name, value in exact.items():
             held[name] += bool((np.abs(numbers[name] - value) <= bars[name]).all())
-    assert all(135 <= number <= 148 for number in held.values()), held
+    assert all(90 <= number <= 99 for number in held.values()), held
 
 
 def test_revolutions_to_one_percent_are_as_many_as_it_takes(record):
