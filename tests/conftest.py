@@ -364,8 +364,7 @@ def jobs_here():
     def run_batches(work, jobs, workers, store=None):
         done, jobs = 0, [*jobs]
         while some := jobs[done : 2 * done if done > 7 else done + 1]:  # in few files if many
-            found = [work(payload) for _, payload, _ in some]
-            found = store(found) if store else found
+            found = (store or list)([work(payload) for _, payload, _ in some])
             yield from (End(job[0], one, 0.01) for job, one in zip(some, found, strict=True))
             done += len(some)
 

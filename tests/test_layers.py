@@ -52,6 +52,9 @@ OF_PHYSICS = {
 }  # fmt: skip
 
 
+parse = cache(ast.parse)
+
+
 def read_sources():
     """The text of each module; a package's door has the package's name."""
     found = {}
@@ -81,16 +84,10 @@ def study(module):
 
 
 @cache
-def nodes(text):
-    """Every node of a module's syntax."""
-    return [*ast.walk(ast.parse(text))]
-
-
-@cache
 def imports(text):
     """(module, name) of each import; the name is "" where the whole module is imported."""
     found = []
-    for node in nodes(text):
+    for node in ast.walk(parse(text)):
         if isinstance(node, ast.Import):
             found += [(alias.name, "") for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -130,7 +127,7 @@ def faults(module, text):
             yield f"{module} imports the study {source}"
     packages = {name for source, name in imports(text) if source == "compressor"} & {*PACKAGES}
     doors = {name: {one for _, one in imports(SOURCES[f"compressor.{name}"])} for name in packages}
-    for node in nodes(text) if doors else ():
+    for node in ast.walk(parse(text)) if doors else ():
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
             package = node.value.id
             if node.attr not in doors.get(package, {node.attr}):

@@ -28,13 +28,8 @@ JOINTS = {9: ("big_end", "big_end"), 12: ("small_end", "small_end"),
 
 
 @pytest.fixture(scope="module")
-def made(paper_runs):
+def drawn(paper_runs):
     return {number: shown(number, paper_runs) for number in FIGURE}
-
-
-@pytest.fixture(scope="module")
-def drawn(made):
-    return {number: one.figure for number, one in made.items()}
 
 
 def lines(panel):
@@ -57,7 +52,7 @@ def curve(run, values, factor):
 
 def views(drawn, number):
     """The panels of a figure: those in full, and the enlarged one, of each quantity."""
-    panels = panels_of(drawn[number])
+    panels = panels_of(drawn[number].figure)
     enlarged = [panel for panel in panels if "enlarged" in panel.title]
     found = []
     for view in sorted(enlarged, key=lambda panel: -panel.y.domain[1]):
@@ -105,12 +100,12 @@ def test_contact_force_lines(drawn, paper_runs, number):
 def test_piston_force_lines(drawn, paper_runs):
     runs = [paper_runs[name] for name in ("design", "typical")]
     expected = [curve(run, run["piston_force"], 1e-3) for run in runs]
-    check_lines(panels_of(drawn[7])[0], expected)
+    check_lines(panels_of(drawn[7].figure)[0], expected)
 
 
 @pytest.mark.parametrize(("number", "joint"), [(10, "big_end"), (13, "small_end")])
 def test_relation(drawn, paper_runs, number, joint):
-    for panel, size in zip(panels_of(drawn[number]), SIZES, strict=True):
+    for panel, size in zip(panels_of(drawn[number].figure), SIZES, strict=True):
         run = paper_runs[f"{joint} {size}"]
         a = run["acceleration"].values[SETTLED]
         force = run["contact_force"].sel(joint=joint, axis="x").values[SETTLED]
@@ -121,7 +116,7 @@ def test_relation(drawn, paper_runs, number, joint):
 
 
 def test_pressure_volume(drawn, paper_runs):
-    (panel,) = panels_of(drawn[3])
+    (panel,) = panels_of(drawn[3].figure)
     run = paper_runs["typical"]
     area = np.pi * 0.05**2
     volume = area * (0.740 - run["displacement"].values[SETTLED]) * 1000
@@ -154,7 +149,7 @@ def test_pressure_volume_of_a_cylinder(tmp_path, monkeypatch, gas, pressures):
 
 
 def test_cam(drawn):
-    contour, follower = panels_of(drawn[4])
+    contour, follower = panels_of(drawn[4].figure)
     cam = Cam(record(paper_cases()["design"]))
     turn = np.radians(np.linspace(0, 360, 1441))
     path, circle = lines(contour)
@@ -189,7 +184,7 @@ def test_enlarged_views_are_marked_and_hold_their_curves(drawn, number):
 
 @pytest.mark.parametrize("number", FIGURE)
 def test_axes_name_their_units(drawn, number):
-    panels = panels_of(drawn[number])
+    panels = panels_of(drawn[number].figure)
     titles = [axis.title.text for panel in panels for axis in (panel.x, panel.y)]
     titles = [title for title in titles if title]
     assert len(titles) >= 2
@@ -203,7 +198,7 @@ def test_axes_name_their_units(drawn, number):
 @pytest.mark.parametrize("number", [3, 4, 6, 7, 10, 14, 15])  # one of each arrangement
 def test_legends_cover_no_panel_and_nothing_warns(drawn, number, caplog):
     with matplotlib.rc_context(pictures.STYLE):
-        figure = pictures.paint(drawn[number])
+        figure = pictures.paint(drawn[number].figure)
         figure.draw_without_rendering()
     assert not caplog.records
     legends = [*figure.legends, *(p.get_legend() for p in figure.axes if p.get_legend())]
@@ -257,8 +252,8 @@ def wild():
 
 
 @pytest.mark.parametrize("number", FIGURE)
-def test_a_caption_is_a_sentence_and_numbers(made, number):
-    found = made[number]
+def test_a_caption_is_a_sentence_and_numbers(drawn, number):
+    found = drawn[number]
     assert re.fullmatch(r"[A-Z(].*[a-z]\.", found.sentence, re.DOTALL)
     assert found.numbers
     assert all(NUMBER.search(text) for _, text in found.numbers)
@@ -266,9 +261,9 @@ def test_a_caption_is_a_sentence_and_numbers(made, number):
 
 
 @pytest.mark.parametrize(("number", "fault"), RESPONSES.items())
-def test_peaks_lost_contact_and_differences_are_the_runs(made, paper_runs, wild, number, fault):
+def test_peaks_lost_contact_and_differences_are_the_runs(drawn, paper_runs, wild, number, fault):
     for runs in (paper_runs, wild):
-        found = shown(number, wild) if runs is wild else made[number]
+        found = shown(number, wild) if runs is wild else drawn[number]
         worn = [runs[label(fault, c)] for c in CLEARANCES]
         peaks = [float(run["peak_acceleration"]) for run in worn]
         assert told(found, "greatest acceleration") == pytest.approx(peaks, rel=1e-3)
@@ -288,27 +283,27 @@ def test_peaks_lost_contact_and_differences_are_the_runs(made, paper_runs, wild,
 
 
 @pytest.mark.parametrize(("number", "where"), JOINTS.items())
-def test_forces_are_those_of_the_joint(made, paper_runs, number, where):
-    (fault, joint), found = where, made[number]
+def test_forces_are_those_of_the_joint(drawn, paper_runs, number, where):
+    (fault, joint), found = where, drawn[number]
     runs = [paper_runs[label(fault, c)]["peak_contact_force_axis"] for c in CLEARANCES]
     for axis, words in (("x", "along the cylinder"), ("y", "across it")):
         peaks = [float(run.sel(joint=joint, axis=axis)) / 1e3 for run in runs]
         assert told(found, words) == pytest.approx(peaks, rel=1e-3)
 
 
-def test_loads_are_told_by_their_peaks_and_corners(made, paper_runs):
-    found = made[7]
+def test_loads_are_told_by_their_peaks_and_corners(drawn, paper_runs):
+    found = drawn[7]
     assert told(found, "force of the spring") == [3.345]
     assert told(found, "force of the gas") == [3.087]
     assert told(found, "corners of the spring") == [84.26, 180.0, 275.74]
-    assert told(made[6], "greatest difference") == [0.0] * 3
+    assert told(drawn[6], "greatest difference") == [0.0] * 3
     moved = paper_runs["typical"].assign(velocity=1.01 * paper_runs["typical"]["velocity"])
     assert told(shown(6, {**paper_runs, "typical": moved}), "greatest difference")[1] > 0.1
 
 
 @pytest.mark.parametrize(("number", "joint"), [(10, "big_end"), (13, "small_end")])
-def test_a_relation_is_told_by_its_numbers(made, paper_runs, number, joint):
-    found, fits = made[number], []
+def test_a_relation_is_told_by_its_numbers(drawn, paper_runs, number, joint):
+    found, fits = drawn[number], []
     for size in SIZES:
         run = paper_runs[f"{joint} {size}"].isel(time=SETTLED)
         a, force = (
@@ -321,13 +316,13 @@ def test_a_relation_is_told_by_its_numbers(made, paper_runs, number, joint):
         assert told(found, words) == pytest.approx(values, rel=1e-3)
 
 
-def test_the_cam_and_the_gas_are_told_by_their_numbers(made):
-    found = made[4]
+def test_the_cam_and_the_gas_are_told_by_their_numbers(drawn):
+    found = drawn[4]
     assert told(found, "as printed") == [208.7, 81.28]
     assert told(found, "closed cam") == [120.0]
     assert told(found, "same from") == [294.0]
-    assert told(made[3], "phases") == [38.95, 180.0, 294.2]
-    assert told(made[3], "off the") == [0.2]
+    assert told(drawn[3], "phases") == [38.95, 180.0, 294.2]
+    assert told(drawn[3], "off the") == [0.2]
     exact = simulate(Case.from_values({"load": "gas", "gas": {"switching": "exact"}}))
     assert told(shown(3, {"typical": exact}), "off the") == [0.0]
 
