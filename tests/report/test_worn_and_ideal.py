@@ -27,7 +27,7 @@ def swept(once):
     return once("side-by-side", lambda folder: store_cases(folder, own=CASE)) / "results"
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def study(swept):
     return read_store(swept), open_study(swept).load()
 
@@ -60,7 +60,7 @@ def test_the_column_without_clearance_is_the_closed_form(swept, study):
 @pytest.mark.parametrize("worst", [0.05, 0.15, 0.25, 0.4])
 def test_the_worst_job_stands_there_in_the_order_of_clearance(study, worst, monkeypatch):
     monkeypatch.setattr(side_by_side, "MAX_WORN", 5)
-    stored, data = study
+    stored, data = study[0], study[1].copy(deep=True)
     data["peak_contact_force"] *= np.where(data["clearance_mm"] == worst, 1e3, 1.0)[:, None]
     found = compare_healthy(stored, data)
     columns = shown(found)
@@ -72,7 +72,7 @@ def test_the_worst_job_stands_there_in_the_order_of_clearance(study, worst, monk
 
 
 def test_a_peak_that_is_not_known_makes_no_job_the_worst(study):
-    stored, data = study
+    stored, data = study[0], study[1].copy()
     data["peak_contact_force_error"] = data["peak_contact_force"] * 0.0 + np.inf
     found = compare_healthy(stored, data)
     assert "contact force" not in found.words
