@@ -12,6 +12,7 @@ import pytest
 from chaos.common import contents, differing
 from compsim.cli import main
 from conftest import jobs_here, wait_for, write_cases
+from dask import config
 
 from compressor.cases.load import load_studies
 from compressor.store import reader as store
@@ -24,8 +25,9 @@ from compressor.sweep.sweep import Options, sweep
 
 @pytest.fixture(scope="module")
 def dask():
-    """Two worker processes with our path."""
-    with pytest.MonkeyPatch.context() as patch:
+    """Two worker processes with our path; of one that died results are waited for 3 s, not 30."""
+    brief = config.set({"distributed.comm.timeouts.connect": "3s"})
+    with brief, pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
         with distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
@@ -105,9 +107,9 @@ def test_no_scheduler_is_a_mistake(studies, tmp_path, capsys, monkeypatch):
 def test_sigterm_keeps_what_is_finished_and_cancels_the_rest(dask, tmp_path):
     values = {"joint": "big_end", "clearance_mm": {"linspace": [0.1, 0.3, 3000]},
               "output": {"keep": "metrics"}}  # fmt: skip
-    (config,) = write_cases(tmp_path, long=values)
+    (path,) = write_cases(tmp_path, long=values)
     out = tmp_path / "out"
-    call = [sys.executable, "-m", "compsim", "run", str(config), "-r", str(out)]
+    call = [sys.executable, "-m", "compsim", "run", str(path), "-r", str(out)]
     call += ["--scheduler", dask.scheduler_address]
     running = subprocess.Popen(call, stderr=subprocess.PIPE, text=True)
     wait_for(lambda: list(out.glob("batches/*.h5")))
