@@ -135,7 +135,7 @@ def lagrange():
         found = evaluate(w, v, [p[name] for name in fields.values()])
         jacobian, bias, inertia, pushed = (np.array(part, float) for part in found)
         carried = jacobian.T @ inertia
-        parts = inertia[:2] + inertia[12:14]  # of the rod, whose first shape is 1, and crosshead
+        parts = inertia[[0, 1, 12, 13]]  # of the rod, whose first shape is 1, and crosshead
         return (
             carried @ jacobian, pushed - carried @ bias, parts @ jacobian, parts @ bias
         )  # fmt: skip
@@ -174,10 +174,8 @@ def test_accelerations_are_lagranges(lagrange, joint, features):
 @pytest.mark.parametrize("unbalance", [0.3, -9.0])
 @pytest.mark.parametrize(("joint", "features"), COMBINATIONS)
 def test_the_frame_takes_the_momentum_that_the_parts_lose(lagrange, joint, features, unbalance):
-    """Less their weight; with load, contacts, all friction and a crank out of balance.
-
-    It is so towards its pin, or opposite to it by a counterweight.
-    """
+    """Less their weight, in all and part by part; with load, contacts, all friction and a crank out
+    of balance, towards its pin or opposite to it by a counterweight."""
     values = {"load": "gas", "machine": {"gravity_m_per_s2": 9.81}}
     p = featured(joint, features, values, rubbing=1, unbalance=unbalance)
     rng = np.random.default_rng(5)
@@ -190,13 +188,21 @@ def test_the_frame_takes_the_momentum_that_the_parts_lose(lagrange, joint, featu
         along = np.array([math.cos(w[0]), math.sin(w[0])])
         across = np.array([-along[1], along[0]])
         unbalance = p["unbalance"] * (gained[0] * across - rates[0] ** 2 * along)
-        weight = np.array([0.0, p["gravity"] * (p["rod_mass"] + p["reciprocating_mass"])])
-        lost = -(slope @ gained + bias + unbalance + weight)
+        # what the rod and the crosshead gain, and what holds their weight
+        rod, crosshead = (slope @ gained + bias).reshape(2, 2)
+        rod[1] += p["gravity"] * p["rod_mass"]
+        crosshead[1] += p["gravity"] * p["reciprocating_mass"]
         row = np.empty(WIDE)
         observe_at(t, y, 1, p, row)
-        found = row[Column.SHAKING_FORCE : Column.SHAKING_FORCE + 2]
-        size = np.abs(lost).max() + row[Column.FORCE_SIZE : Column.FORCE_SIZE + 2].max()
-        assert found == pytest.approx(lost, abs=1e-11 * size)
+        on_rod = row[Column.FORCE : Column.FORCE + 4].reshape(2, 2)
+        lost, on_guide = -(rod + crosshead + unbalance), -on_rod[1] - crosshead
+        limit = 1e-11 * (np.abs(lost).max() + row[Column.FORCE_SIZE : Column.FORCE_SIZE + 2].max())
+        assert on_rod.sum(axis=0) == pytest.approx(rod, abs=limit)
+        for column, expected in (
+            (Column.SHAKING_FORCE, lost), (Column.BEARING_FORCE, lost - on_guide),
+            (Column.GUIDE_FORCE, on_guide[1:]),
+        ):  # fmt: skip
+            assert row[column : column + expected.size] == pytest.approx(expected, abs=limit)
 
 
 @pytest.mark.parametrize("forces", ["plain", "oil", "card"])
