@@ -79,22 +79,25 @@ def torque_and_moment(crank, x, forces, friction, penetration, film, p):
 
 
 @inner
-def write_frame_forces(guide, turning, row):
-    """Write the machine's forces (N) on its frame, by those on the guide and of the unbalance."""
+def write_frame_forces(on_guide, turning, row):
+    """Write the machine's forces (N) on its frame.
+
+    on_guide: of the crosshead, x and y; turning: of the unbalance on the crank, x and y.
+    """
     row[BEARING_FORCE] = -row[FORCE] - turning[0]
     row[BEARING_FORCE + 1] = -row[FORCE + 1] - turning[1]
-    row[GUIDE_FORCE] = guide[1]
-    row[SHAKING_FORCE] = row[BEARING_FORCE] + (row[PISTON_FORCE] + guide[0])
-    row[SHAKING_FORCE + 1] = row[BEARING_FORCE + 1] + guide[1]
+    row[GUIDE_FORCE] = on_guide[1]
+    row[SHAKING_FORCE] = row[BEARING_FORCE] + (row[PISTON_FORCE] + on_guide[0])
+    row[SHAKING_FORCE + 1] = row[BEARING_FORCE + 1] + on_guide[1]
 
 
 @inner
 def write_scene_frame(cos_theta, sin_theta, p, row):
     """Write `write_frame_forces` of a scene: a crosshead at its height, a steady crank."""
-    guide = 0.0, -row[FORCE + 3] - p.reciprocating_mass * p.gravity
+    on_guide = 0.0, -row[FORCE + 3] - p.reciprocating_mass * p.gravity
     inward = p.unbalance * p.omega * p.omega
     # 0 less a zero has no sign, so that a balanced crank leaves the bits of the forces
-    write_frame_forces(guide, (0.0 - inward * cos_theta, 0.0 - inward * sin_theta), row)
+    write_frame_forces(on_guide, (0.0 - inward * cos_theta, 0.0 - inward * sin_theta), row)
 
 
 @jit

@@ -293,13 +293,16 @@ def select_jobs(
     """Return (value, key) of jobs along an axis in its order, its title, the other axes in words.
 
     At most `most`. Where both clearances vary, a value is both: one alone would seem to be the
-    cause of what the other does. Raises PlotError where `at` names no job, or the axis itself.
+    cause of what the other does. Raises PlotError where `at` names no job, the axis itself, or an
+    axis twice.
     """
     fixed = {}
     for text in at:
         key, value = store.find_value(folder, study, text)
         if key == over:
             raise PlotError(f"--at {text}: needs key=value of an axis other than {over}")
+        if key in fixed:
+            raise PlotError(f"--at {text}: {key} is given twice; a figure has one value of it")
         fixed[key] = value
     if study.is_grid:
         first = {axis.key: axis.values[0] for axis in study.axes if axis.key != over}

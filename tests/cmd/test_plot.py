@@ -172,6 +172,7 @@ def test_a_damaged_job_is_a_row_without_series(folder, tmp_path, compsim, unpain
         ("worn --what noise", "there is no figure 'noise'; there are analyst"),
         ("worn --at speed_rpm=450", "no job of worn has machine.speed_rpm=450; there are 400"),
         ("worn --at clearance_mm=0.1", "needs key=value of an axis other than"),
+        ("worn --at speed_rpm=400 --at speed_rpm=500", "machine.speed_rpm is given twice"),
         ("bare", "no job of bare can be drawn: no series: run it again with --set output.keep"),
         ("short", "too short: run it with a longer solve.duration_rev"),
         ("KEY-halted", "failed: budget_steps"),
