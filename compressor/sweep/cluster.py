@@ -132,6 +132,13 @@ def run_on_cluster(
                 return
             future = next(ready)
             batch, error = out.pop(future), future.exception()
+            found: Any = None
+            is_lost = future.cancelled() or client.status != "running"
+            if not error and not is_lost:
+                try:
+                    found = future.result()
+                except KilledWorker as late:  # it lay in a worker that died, and ran again
+                    error = late
             if isinstance(error, KilledWorker) and not batch[0].again:
                 suspects += batch
                 continue
@@ -139,12 +146,12 @@ def run_on_cluster(
                 how = f"{error.allowed_failures + 1} workers of the cluster that had it alone"
                 yield End(batch[0].id, reason=Reason.WORKER_DIED, detail=f"it felled {how}")
                 continue
-            if future.cancelled() or client.status != "running":
+            if is_lost:
                 raise lost_scheduler from error
-            problem = f"no compsim, or an old one ({error})" if error else future.result()[0]
+            problem = f"no compsim, or an old one ({error})" if error else found[0]
             if problem:
                 raise ClusterError(f"a worker of the cluster has {problem}; {SAME}") from error
-            _, ends, written = future.result()
+            _, ends, written = found
             for data in written:
                 publish_batch(folder, data)
             for job, end in zip(batch, ends, strict=True):

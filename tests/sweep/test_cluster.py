@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from unittest.mock import Mock
 
 import bad_jobs
 import distributed
@@ -21,6 +22,7 @@ from compressor.store.status import verify
 from compressor.sweep import cluster
 from compressor.sweep.cluster import ClusterError, connect_cluster
 from compressor.sweep.sweep import Options, sweep
+from compressor.sweep.wanted import RequestedJobs
 
 
 @pytest.fixture(scope="module")
@@ -102,6 +104,30 @@ def test_no_scheduler_is_a_mistake(studies, tmp_path, capsys, monkeypatch):
     assert main(["run", studies[0].path, "-r", str(tmp_path / "out"), *options]) == 2
     assert "no scheduler answers" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_result_that_is_felled_with_its_worker_is_made_alone(studies, tmp_path, monkeypatch):
+    """It ended the sweep: dask runs such a batch again, and may lose it where it is fetched."""
+
+    class Ready(list):
+        add = list.append
+
+        def __next__(self):
+            return self.pop(0)
+
+    def submit(do, *arguments, pure):
+        future = Mock(**{"exception.return_value": None, "cancelled.return_value": False})
+        future.result = Mock(side_effect=felled.pop() if felled else None)
+        future.result.return_value = do(*arguments)
+        return future
+
+    felled = [distributed.scheduler.KilledWorker("a batch", None, 3)]
+    client = Mock(status="running", submit=submit, **{"nthreads.return_value": {"worker": 1}})
+    monkeypatch.setattr(distributed, "as_completed", lambda loop: Ready())
+    jobs = RequestedJobs(studies[1:])
+    ends = [*cluster.run_on_cluster(client, "an address", tmp_path, jobs, str)]
+    assert {end.id: end.reason for end in ends} == dict.fromkeys(jobs.places, "")
+    assert store.read_store(tmp_path).keys() == jobs.places.keys()
 
 
 def test_sigterm_keeps_what_is_finished_and_cancels_the_rest(dask, tmp_path):
