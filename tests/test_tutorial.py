@@ -9,8 +9,7 @@ from page_commands import missing, run_command
 from page_tables import ROOT
 
 TEXT = (ROOT / "compressor/cases/examples/TUTORIAL.md").read_text(encoding="utf-8")
-# of 64 jobs the page shows no error bar: one run each is enough, of the same numbers
-LESS = {"compsim run sampling.yaml": ("--set", "solve.error_bars=false")}
+LESS = {"compsim run sampling.yaml": ("--set", "solve.error_bars=false")}  # which none shows
 BLOCK = re.compile(r"^```(console|py)\n(.*?)^```\n(?:\n```text\n(.*?)^```\n)?", re.M | re.S)
 
 

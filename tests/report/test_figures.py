@@ -62,11 +62,6 @@ def views(drawn, number):
     return found
 
 
-def test_the_registry_has_the_papers_figures():
-    assert [*FIGURE][:13] == [3, 4, *range(6, 17)]
-    assert [*FIGURE] == sorted(FIGURE)
-
-
 # ---- lines ------------------------------------------------------------------------------------
 
 
