@@ -39,13 +39,11 @@ MISTAKES = [
     # options
     ("run good.yaml --set speed_rpm=700", "unknown key; did you mean machine.speed_rpm?"),
     ("run good.yaml -j -2", "'-j' / '--jobs'", "-2", "x>=1"),
-    ("run good.yaml -j all", "'-j' / '--jobs'", "'all' is not a valid number"),
     ("run good.yaml --set 'load=[none, spring]' --max-jobs 1",
      "--set load=[none, spring]: load: 2 jobs are more than 1: ask for fewer, or"),
     ("run good.yaml --only 'clearance_mm > 9'", "selects no job", "compsim plan"),
     *((f"run good.yaml --shard {part}", "no I/N with 1 <= I <= N, such as 2/8")
       for part in ("0/2", "3/2", "2", "a/b", "1/-2")),
-    ("run good.yaml --quite", "No such option '--quite'"),
     ("run good.yaml -r good.yaml", "Folder 'good.yaml' is a file"),
     ("run good.yaml -r ''", "'-r' / '--results'", "is a shell variable not set?"),
     # commands

@@ -116,11 +116,8 @@ def flipped(data, at, bit):
 
 
 def damages(data, rng):
-    """Bits of each byte of the superblock, some of all parts of the file, and ends that are early.
-
-    Before byte 12 are those that say how the file is to be read: all their bits.
-    """
-    for at in range(48):
+    """Bits of each byte of the superblock and some of all parts of the file, and early ends."""
+    for at in range(48):  # the first twelve bytes say how the file is to be read
         yield from (flipped(data, at, bit) for bit in (range(8) if at < 12 else [at % 8]))
     for _ in range(200):
         yield flipped(data, rng.randrange(48, len(data)), rng.randrange(8))

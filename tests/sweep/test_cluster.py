@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 import sys
-from unittest.mock import Mock
+from unittest.mock import MagicMock, Mock
 
 import bad_jobs
 import distributed
@@ -47,15 +47,6 @@ def studies(tmp_path_factory):
             "clearance_mm": {"linspace": [0.1, 0.3, 31]}}  # fmt: skip
     few = {"joint": "small_end", "clearance_mm": {"linspace": [0.1, 0.3, 5]}, "solve": solve}
     return load_studies(*write_cases(folder, many=many, few=few))
-
-
-@pytest.fixture(scope="module")
-def locally(studies, tmp_path_factory):
-    """What is stored of the studies' jobs by this process."""
-    folder = tmp_path_factory.mktemp("local")
-    with jobs_here():
-        sweep(studies, folder, 1)
-    return contents(folder)
 
 
 def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_path, monkeypatch):
@@ -109,12 +100,6 @@ def test_no_scheduler_is_a_mistake(studies, tmp_path, capsys, monkeypatch):
 def test_a_result_that_is_felled_with_its_worker_is_made_alone(studies, tmp_path, monkeypatch):
     """It ended the sweep: dask runs such a batch again, and may lose it where it is fetched."""
 
-    class Ready(list):
-        add = list.append
-
-        def __next__(self):
-            return self.pop(0)
-
     def submit(do, *arguments, pure):
         future = Mock(**{"exception.return_value": None, "cancelled.return_value": False})
         future.result = Mock(side_effect=felled.pop() if felled else None)
@@ -123,7 +108,9 @@ def test_a_result_that_is_felled_with_its_worker_is_made_alone(studies, tmp_path
 
     felled = [distributed.scheduler.KilledWorker("a batch", None, 3)]
     client = Mock(status="running", submit=submit, **{"nthreads.return_value": {"worker": 1}})
-    monkeypatch.setattr(distributed, "as_completed", lambda loop: Ready())
+    ready = MagicMock(add=(there := []).append)
+    ready.__next__.side_effect = lambda: there.pop(0)
+    monkeypatch.setattr(distributed, "as_completed", lambda loop: ready)
     jobs = RequestedJobs(studies[1:])
     ends = [*cluster.run_on_cluster(client, "an address", tmp_path, jobs, str)]
     assert {end.id: end.reason for end in ends} == dict.fromkeys(jobs.places, "")
@@ -148,8 +135,10 @@ def test_sigterm_keeps_what_is_finished_and_cancels_the_rest(dask, tmp_path):
     wait_for(lambda: not dask.scheduler.tasks)
 
 
-def test_a_job_that_fells_its_worker_is_lost_alone(dask, studies, locally, tmp_path, monkeypatch):
+def test_a_job_that_fells_its_worker_is_lost_alone(dask, studies, tmp_path, monkeypatch):
     """The last test, since it costs the workers, one of them amid jobs that run elsewhere then."""
+    with jobs_here():
+        sweep(studies, tmp_path / "local", 1)
     monkeypatch.setattr(dask.scheduler, "allowed_failures", 0)
     monkeypatch.setattr(cluster, "run_job", bad_jobs.harmful)
     monkeypatch.setattr(cluster, "run_cases", bad_jobs.run_harmful_cases)
@@ -161,6 +150,8 @@ def test_a_job_that_fells_its_worker_is_lost_alone(dask, studies, locally, tmp_p
     assert lost.reason == "worker_died"
     assert lost.detail == "it felled 1 workers of the cluster that had it alone"
     found = tmp_path / "out"
-    assert differing(contents(found), locally) == lost.key  # to the bit, timings apart
+    assert (
+        differing(contents(found), contents(tmp_path / "local")) == lost.key
+    )  # to the bit, timings apart
     assert verify(found) == []
     assert not list(found.glob("**/.*"))

@@ -137,11 +137,9 @@ def test_a_job_may_succeed_when_it_is_tried_again(tmp_path):
 
 
 SCRIPT = """
-import bad_jobs, functools, signal, sys, time
+import bad_jobs, functools, time
 from compressor.sweep.pool import run_batches
 from compressor.sweep.worker import Workers
-
-signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
 """
 
 
