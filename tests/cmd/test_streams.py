@@ -54,12 +54,8 @@ def test_output_that_does_not_fit_is_told_in_one_line(spawn):
 
 
 def test_a_lack_of_memory_is_told_in_one_line(capsys):
-    mapping = ImportError("numpy.so: failed to map segment from shared object")
-    for error in (
-        MemoryError("Unable to allocate"),
-        mapping,
-        OSError(12, "Cannot allocate memory"),
-    ):
+    unmapped = ImportError("numpy.so: failed to map segment from shared object")
+    for error in (MemoryError("8 GiB"), unmapped, OSError(12, "Cannot allocate memory")):
         assert cli.report_error(error) == 1
         said = capsys.readouterr().err
         assert said.startswith("compsim: not enough memory: allow more (ulimit -v)")

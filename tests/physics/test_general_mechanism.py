@@ -198,10 +198,9 @@ def test_the_frame_takes_the_momentum_that_the_parts_lose(lagrange, joint, featu
         lost, on_guide = -(rod + crosshead + unbalance), -on_rod[1] - crosshead
         limit = 1e-11 * (np.abs(lost).max() + row[Column.FORCE_SIZE : Column.FORCE_SIZE + 2].max())
         assert on_rod.sum(axis=0) == pytest.approx(rod, abs=limit)
-        for column, expected in (
-            (Column.SHAKING_FORCE, lost), (Column.BEARING_FORCE, lost - on_guide),
-            (Column.GUIDE_FORCE, on_guide[1:]),
-        ):  # fmt: skip
+        parts = {Column.SHAKING_FORCE: lost, Column.BEARING_FORCE: lost - on_guide,
+                 Column.GUIDE_FORCE: on_guide[1:]}  # fmt: skip
+        for column, expected in parts.items():
             assert row[column : column + expected.size] == pytest.approx(expected, abs=limit)
 
 

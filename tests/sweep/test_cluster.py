@@ -150,8 +150,7 @@ def test_a_job_that_fells_its_worker_is_lost_alone(dask, studies, tmp_path, monk
     assert lost.reason == "worker_died"
     assert lost.detail == "it felled 1 workers of the cluster that had it alone"
     found = tmp_path / "out"
-    assert (
-        differing(contents(found), contents(tmp_path / "local")) == lost.key
-    )  # to the bit, timings apart
+    # to the bit, timings apart
+    assert differing(contents(found), contents(tmp_path / "local")) == lost.key
     assert verify(found) == []
     assert not list(found.glob("**/.*"))
