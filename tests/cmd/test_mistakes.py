@@ -44,7 +44,6 @@ MISTAKES = [
     ("run good.yaml --only 'clearance_mm > 9'", "selects no job", "compsim plan"),
     *((f"run good.yaml --shard {part}", "no I/N with 1 <= I <= N, such as 2/8")
       for part in ("0/2", "3/2", "2", "a/b", "1/-2", "''")),
-    ("run good.yaml -r good.yaml", "Folder 'good.yaml' is a file"),
     ("run good.yaml -r ''", "'-r' / '--results'", "is a shell variable not set?"),
     # commands
     ("rnu good.yaml", "No such command 'rnu'"),
