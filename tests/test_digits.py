@@ -50,15 +50,16 @@ def test_a_share_or_a_count_is_bounded_where_it_may_be_nothing(value, bar, text)
     assert by_bar(value, bar, relative=False) == text
 
 
-@pytest.mark.parametrize("exponent", range(-12, 12))
-@pytest.mark.parametrize("bar", [0.0123, 0.0199, 0.02, 0.0999, 0.3, 0.949, 0.951])
-def test_the_bar_that_is_shown_is_never_shorter(exponent, bar):
-    value, bar = 3.14159265358979 * 10.0**exponent, bar * 10.0**exponent
-    text = by_bar(value, bar)
-    scale = float("1e" + text.partition(")e")[2]) if ")e" in text else 1.0
-    shown, error = (float(part) * scale for part in text.strip("(").partition(")")[0].split(" ± "))
-    assert bar * (1 - 1e-9) <= error <= 1.5 * bar * (1 + 1e-9)
-    assert abs(shown - value) <= 0.51 * error
+@pytest.mark.parametrize("first", [0.0123, 0.0199, 0.02, 0.0999, 0.3, 0.949, 0.951])
+def test_the_bar_that_is_shown_is_never_shorter(first):
+    for exponent in range(-12, 12):
+        value, bar = 3.14159265358979 * 10.0**exponent, first * 10.0**exponent
+        text = by_bar(value, bar)
+        scale = float("1e" + text.partition(")e")[2]) if ")e" in text else 1.0
+        numbers = text.strip("(").partition(")")[0].split(" ± ")
+        shown, error = (float(part) * scale for part in numbers)
+        assert bar * (1 - 1e-9) <= error <= 1.5 * bar * (1 + 1e-9), text
+        assert abs(shown - value) <= 0.51 * error, text
 
 
 def test_no_more_digits_are_shown_than_double_precision_vouches_for():

@@ -73,7 +73,6 @@ MISTAKES = [
     ("show wear clearance_mm=0.1 clearance_mm=0.2", "an axis is given twice"),
     ("show wear --case --json", "--case prints a case file: leave out --json"),
     ("show wear --json --units plant", "--json has all numbers in SI", "leave out --units plant"),
-    ("show", "Missing argument 'JOB | STUDY [AXIS=VALUE]...'"),
     ("export gird -o x.csv", "holds no study 'gird'; it holds big-end, wear"),
     ("export wear -o k.xlsx", "k.xlsx: is no name of a CSV file; end it in .csv"),
     ("plot waer", "and no study is called so", "did you mean wear?"),

@@ -69,16 +69,16 @@ def test_a_feature_that_is_left_out_is_no_longer_paid_for(feature):
 
 
 @pytest.mark.parametrize("law", CONTACT_LAWS)
-@pytest.mark.parametrize("other", CONTACT_LAWS)
-def test_each_contact_law_may_stand_in_place_of_each_other(law, other):
+def test_each_contact_law_may_stand_in_place_of_each_other(law):
     """With what the case has; what it has not is a default."""
     plain = case(contact={"stiffness_N_per_mm15": 5e5, "damping_N_s_per_mm": 100})
     one = variants.change(plain, variants.contact_values(law, plain))
-    two = variants.change(one, variants.contact_values(other, one))
-    assert Case.from_values(two.values()) == two
-    assert two.contact.law == other
-    if {law, other} <= {"impact", "hertz", "flores", "lankarani_nikravesh"}:
-        assert two.contact.stiffness_N_per_mm15 == 5e5
+    for other in CONTACT_LAWS:
+        two = variants.change(one, variants.contact_values(other, one))
+        assert Case.from_values(two.values()) == two
+        assert two.contact.law == other
+        if {law, other} <= {"impact", "hertz", "flores", "lankarani_nikravesh"}:
+            assert two.contact.stiffness_N_per_mm15 == 5e5, other
 
 
 # ---- numbers in doubt ---------------------------------------------------------------------------

@@ -90,8 +90,8 @@ def test_workers_are_few_with_none_of_our_files_and_one_thread(tmp_path, monkeyp
 
 
 def test_what_is_prepared_is_not_timed(tmp_path):
-    jobs = [(n, n, 0.5) for n in range(4)]
-    rules = Workers(2, partial(bad_jobs.prepare, tmp_path, 1.0), grace=0.2)
+    jobs = [(n, n, 0.3) for n in range(4)]
+    rules = Workers(2, partial(bad_jobs.prepare, tmp_path, 0.6), grace=0.2)
     ends = list(run_batches(partial(bad_jobs.is_prepared, tmp_path), jobs, rules))
     assert results(ends) == dict.fromkeys(range(4), True)
 
@@ -158,11 +158,11 @@ def test_a_worker_s_time_stands_still_with_ours(tmp_path):
     """All are stopped, as by Ctrl-Z, for longer than the job may take."""
     running, _ = started(tmp_path, """
 sleep = functools.partial(bad_jobs.announced, do=time.sleep)
-for end in run_batches(sleep, [(n, 0.5, 0.8) for n in range(2)], Workers(2, grace=0.5)):
+for end in run_batches(sleep, [(n, 0.4, 0.6) for n in range(2)], Workers(2, grace=0.4)):
     print(end)
 """)  # fmt: skip
     os.killpg(running.pid, signal.SIGSTOP)
-    time.sleep(1.5)
+    time.sleep(1.2)
     os.killpg(running.pid, signal.SIGCONT)
     said, _ = running.communicate(timeout=60)
     assert said.count("reason=''") == 2
