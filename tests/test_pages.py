@@ -43,7 +43,7 @@ TEXT = "\n".join(PAGES.values())
 QUICK = ["--set", "solve.duration_rev=1", "--set", "solve.settle_rev=0"]
 # commands that tests of their own run: their words are read here
 READ = {"plan", "plot", *VERBS["Study a machine"], *VERBS["Work with measured records"]}
-# a folder that only such commands read; what `make stress` and tests/test_newcomer.py run
+# a folder that only such commands read; what `make stress` and test_tutorial run
 UNRUN = {"hall", "extremes", "extremes.yaml", "compsim report"}
 
 
