@@ -30,7 +30,7 @@ from compressor.physics import ideal_forces, segments
 from compressor.solve import record
 
 MAX_CASES = 50  # of a study that are looked at, beside the first and the last
-PIECES = 500  # samples of each phase of the load: peaks between its corners to a few 1e-6
+PIECES = 200  # samples of each phase of the load: peaks between its corners to some 1e-5
 
 
 class Usual(NamedTuple):

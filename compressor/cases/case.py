@@ -200,9 +200,9 @@ stroke, 240 mm
         values = vars(self)  # which alone can be written to: a case is frozen
         if self.guide:
             values["guide"] = fill_guide(self.guide, self.machine.reciprocating_mass_kg)
-        is_worn = {one: self.joint in (one, "both") for one in JOINTS}
-        gaps = {one: self.clearance_mm.at(one) if is_worn[one] else 0.0 for one in JOINTS}
-        values["clearance_mm"] = PerJoint(**gaps)
+        if self.joint != "both":
+            gaps = {one: self.clearance_mm.at(one) if one == self.joint else 0.0 for one in JOINTS}
+            values["clearance_mm"] = PerJoint(**gaps)
         if self.joint == "none":  # which has no bore that oil fills, or that wears
             values["lubricant"] = values["wear"] = None
         if self.wear:
@@ -259,7 +259,7 @@ stroke, 240 mm
         """Return the crank speed, rad/s."""
         return self.machine.speed_rpm * math.pi / 30
 
-    @property
+    @cached_property
     def turn(self) -> float:
         """Return the time of one revolution, s."""
         return 60.0 / self.machine.speed_rpm
@@ -306,7 +306,7 @@ stroke, 240 mm
         """Return the crank's unbalance without its counterweight, kg mm, as a drive names it."""
         return self.drive.unbalance_kg_mm if self.drive else 0.0
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Return the duration, s; with `duration_rev: auto` the longest that it may come to."""
         if self.solve.duration_s is not None:
@@ -422,9 +422,13 @@ def plain_values(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Proble
 
 def find_given(values: Mapping[str, Any]) -> frozenset[str]:
     """Return the keys that nested values give, of parts both their own and that of the whole."""
-    keys = values_given(values).keys()
-    above = {str(key).rpartition(".")[0] for key in keys} & parts_by_key().keys()
-    return frozenset(keys | above | {part for key in keys for part in stands_for(key)})
+    return _with_parts(frozenset(values_given(values)))
+
+
+@lru_cache(MAX_GROUPS)  # the jobs of a study give the same keys
+def _with_parts(keys: frozenset[str]) -> frozenset[str]:
+    above = {key.rpartition(".")[0] for key in keys} & parts_by_key().keys()
+    return keys | above | {part for key in keys for part in stands_for(key)}
 
 
 def has_own_cylinder(values: Mapping[str, Any], given: Set[str]) -> bool:
@@ -437,35 +441,41 @@ def has_own_cylinder(values: Mapping[str, Any], given: Set[str]) -> bool:
     )
 
 
-def identity_of(case: Case) -> dict[str, Any]:
-    """Return what makes a case's results, of which its key is the hash."""
+def identity_of(case: Case) -> dict[str, str]:
+    """Return what makes a case's results, of which its key is the hash: JSON texts by name."""
     solve = case.solve
     # what is integrated and from where on it counts, however it is written
     duration: float | str = case.duration if solve.duration_rev != "auto" else "auto"
     settle: float | str = case.settle if solve.settle_rev != "auto" else "auto"
-    targets = {} if isinstance(solve.accuracy, str) else dict(solve.accuracy)
-    found: dict[str, Any] = {
-        "joint": case.joint,
-        "load": case.load,
-        "model": MODEL_VERSION,
-        "span": (duration, settle, round(case.steps)),
-        "solver": (solve.rtol or targets or solve.accuracy, solve.method, solve.max_steps),
-        "facts": _facts_read(case),
+    span = (duration, settle, round(case.steps))
+    found = {
+        **_texts_of_choices(case.joint, case.load, solve),
+        "span": KEY_TEXT.encode(span),
+        "facts": KEY_TEXT.encode(_facts_read(case)),
     }
     if case.joint != "none":
-        found["clearance_mm"] = vars(case.clearance_mm)
+        found["clearance_mm"] = _text_of_group("clearance_mm", case.clearance_mm)
     for name in IDENTITY_GROUPS:
         group = getattr(case, name)
-        if group is not None:
-            found[name] = _identity_of_group(name, group)
-        elif not WORDS[name]:
-            found[name] = False
+        if group is not None or not WORDS[name]:
+            found[name] = _text_of_group(name, group)
     return found
 
 
+@lru_cache(MAX_GROUPS)
+def _texts_of_choices(joint: str, load: str, solve: Solve) -> dict[str, str]:
+    """Return the model, joint, load and solver of a case as JSON texts by name."""
+    targets = {} if isinstance(solve.accuracy, str) else dict(solve.accuracy)
+    solver = (solve.rtol or targets or solve.accuracy, solve.method, solve.max_steps)
+    values = {"joint": joint, "load": load, "model": MODEL_VERSION, "solver": solver}
+    return {name: KEY_TEXT.encode(value) for name, value in values.items()}
+
+
 @lru_cache(MAX_GROUPS)  # values that are equal are of one type: pydantic sees to it
-def _identity_of_group(name: str, group: Any) -> dict[str, Any]:
+def _text_of_group(name: str, group: Any) -> str:
     """Return what a group gives, without facts: those that are read are a part of their own."""
+    if group is None:
+        return "false"
     given = {
         key: vars(value) if isinstance(value, BY_PART) else value
         for key, value in vars(group).items()
@@ -473,12 +483,12 @@ def _identity_of_group(name: str, group: Any) -> dict[str, Any]:
     }
     if cards := given.get("indicator"):  # the digest counts, wherever the file is
         given["indicator"] = {end: card and card.rpartition("@")[2] for end, card in cards.items()}
-    return given
+    return KEY_TEXT.encode(given)
 
 
 def _facts_read(case: Case) -> dict[str, Any]:
     """Return the facts that a case has and reads."""
-    holds = frozenset(needed for needed, test in _fact_conditions().items() if test(case))
+    holds = tuple([test(case) for test in _fact_conditions().values()])
     return {key: value for key, get in _facts_where(holds) if (value := get(case)) is not None}
 
 
@@ -489,12 +499,13 @@ def _fact_conditions() -> dict[str, Callable[[Any], bool]]:
 
 
 @cache
-def _facts_where(holds: frozenset[str]) -> list[tuple[str, Callable[[Any], Any]]]:
-    """Return the facts that are read where some conditions hold, and how a case gives each."""
+def _facts_where(holds: tuple[bool, ...]) -> list[tuple[str, Callable[[Any], Any]]]:
+    """Return the facts that are read where these conditions hold, and how a case gives each."""
+    found = dict(zip(_fact_conditions(), holds, strict=True))
     return [
         (key, getter(key))
         for key in FACT_KEYS
-        if all(needed in holds for _, needed in conditions(key))
+        if all(found[needed] for _, needed in conditions(key))
     ]
 
 
@@ -528,9 +539,10 @@ def _plain_value(group: Any) -> dict[str, Any] | bool:
     return plain
 
 
-def digest(identity: Mapping[str, Any]) -> str:
-    """Return the hash of an identity, as JSON: 20 hexadecimal digits."""
-    return hashlib.sha256(KEY_TEXT.encode(identity).encode()).hexdigest()[:20]
+def digest(identity: Mapping[str, str]) -> str:
+    """Return the hash of an identity, as one JSON text: 20 hexadecimal digits."""
+    text = ",".join(f'"{name}":{identity[name]}' for name in sorted(identity))
+    return hashlib.sha256(f"{{{text}}}".encode()).hexdigest()[:20]
 
 
 def with_ideal_joints(case: Case, features: bool = True) -> Case:

@@ -22,7 +22,6 @@ from compressor.cases.parameter import (
     PART_WORDS,
     WRITTEN,
     Parameter,
-    adapter_of,
     convert_other,
     quote_value,
     split_unit,
@@ -100,6 +99,9 @@ def value_of(holder: Any, key: str) -> Any:
 def getter(key: str) -> Callable[[Any], Any]:
     """Return the function that gives a case's value of a dotted key, None without its group."""
     get = operator.attrgetter(key)
+    row, group = table().get(key), key.partition(".")[0]
+    if row and group not in WORDS and (row.default is not None or key.count(".") < 2):
+        return get  # none of what it is in may be missing
 
     def value(case: Any) -> Any:
         try:
@@ -304,8 +306,10 @@ def _nearest(name: str, allowed: Sequence[str], cutoff: float) -> str | None:
 def hold_value(key: str, value: Any) -> Any:
     """Return a value of a key as a case holds it; one that no case can hold as it is."""
     row = row_of(key)
+    if type(value) is float and row and row.kind == "number":  # as most of what is drawn
+        return value or 0.0
     try:
-        held = adapter_of(row).validate_python(value) if row else value
+        held = row.adapter.validate_python(value) if row else value
     except ValidationError:
         return value
     return tuple(sorted(held.items())) if row and isinstance(held, dict) else held
@@ -316,6 +320,7 @@ def values_given(values: Mapping[Any, Any]) -> dict[str, Any]:
     return {key_of(path): value for path, value in walk_leaves(values) if value is not None}
 
 
+@lru_cache(4096)  # asked for of each value of each job
 def key_of(path: Path) -> str:
     """Return the dotted key of a path."""
     return ".".join(map(str, path))

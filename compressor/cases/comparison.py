@@ -13,7 +13,7 @@ import contextlib
 import operator
 import re
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any
 
 from compressor.cases.checks import getter, row_of, suggestion
@@ -79,13 +79,20 @@ def _tree(text: Any) -> ast.expr:
 def _test(node: ast.expr, compare: Callable[[ast.expr], Callable[[Any], bool]]) -> Any:
     """Return the test that a node means; compare: the function that makes that of a comparison."""
     if isinstance(node, ast.BoolOp):
-        join = all if isinstance(node.op, ast.And) else any
-        tests = [_test(part, compare) for part in node.values]
-        return lambda subject: join([test(subject) for test in tests])
+        join = _both if isinstance(node.op, ast.And) else _either
+        return reduce(join, [_test(part, compare) for part in node.values])
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
         inner = _test(node.operand, compare)
         return lambda subject: not inner(subject)
     return compare(node)
+
+
+def _both(first: Callable[[Any], bool], second: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda subject: first(subject) and second(subject)
+
+
+def _either(first: Callable[[Any], bool], second: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda subject: first(subject) or second(subject)
 
 
 def _parts(node: Any) -> tuple[str, Any, str]:
@@ -118,12 +125,12 @@ def _compare_job(key: str, sign: Any, text: str) -> Test:
 
 
 def _compare(get: Callable[[Any], Any], sign: Any, wanted: Any) -> Callable[[Any], bool]:
-    differs = sign is operator.ne
+    """Return the test of one value; a word, or no value, is neither more nor less than a number."""
+    if sign in (operator.eq, operator.ne):
+        return lambda subject: bool(sign(get(subject), wanted))
 
     def test(subject: Any) -> bool:
         found = get(subject)
-        if found is None or isinstance(found, str) is not isinstance(wanted, str):
-            return differs  # a word is neither more nor less than a number
-        return bool(sign(found, wanted))
+        return found is not None and not isinstance(found, str) and bool(sign(found, wanted))
 
     return test

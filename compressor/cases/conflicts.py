@@ -148,8 +148,10 @@ def outside_judged(values: Mapping[str, Any]) -> dict[str, str]:
     found = {}
     ideal = values.get("joint") == "none"
     for key, row in table().items():
+        if row.judged is None or (ideal and key.startswith(OF_CONTACT)):
+            continue
         value, whole = value_of(values, key), key.rpartition(".")[0]
-        if row.judged is None or not is_number(value) or (ideal and key.startswith(OF_CONTACT)):
+        if not is_number(value):
             continue
         if not value and (key in ABSENT_AT_ZERO or whole == "clearance_mm"):
             continue

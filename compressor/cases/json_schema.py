@@ -11,7 +11,7 @@ from typing import Any
 
 from compressor.cases.checks import DOUBLES, keys_of, phrase_of, row_of, row_of_double
 from compressor.cases.load import WHOLE_FILE, Report
-from compressor.cases.parameter import Parameter, adapter_of, rows_of
+from compressor.cases.parameter import Parameter, rows_of
 from compressor.cases.study import Sample
 from compressor.cases.swept import FORMS, SAMPLED
 from compressor.cases.table import GROUPS, WORDS, outside_identity, parts_by_key, table
@@ -106,7 +106,7 @@ def _value(row: Parameter) -> Schema:
 def _single_value(row: Parameter) -> Schema:
     """Return the schema of one value of a parameter."""
     words = (*row.choices, *(alias for alias, _ in row.aliases))
-    return adapter_of(replace(row, optional=False, choices=words)).json_schema()
+    return replace(row, optional=False, choices=words).adapter.json_schema()
 
 
 def _forms() -> Schema:

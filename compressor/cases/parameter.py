@@ -13,7 +13,7 @@ import re
 import reprlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from functools import lru_cache, partial, reduce
+from functools import cached_property, lru_cache, partial, reduce
 from types import NoneType
 from typing import Annotated, Any, Generic, Literal, TypeVar, dataclass_transform, get_args
 
@@ -269,6 +269,11 @@ class Parameter:
             return f"a pair of materials, {words}, such as [steel, steel]"
         return ", or ".join(filter(None, [words, OTHERWISE.get(self.kind)]))
 
+    @cached_property
+    def adapter(self) -> TypeAdapter[Any]:
+        """Return what checks values of this parameter alone."""
+        return TypeAdapter(annotation_of(self))
+
     def choice_of(self, value: Any) -> Any:
         """Return the choice that an alias stands for, and any other value as it is."""
         return next((choice for alias, choice in self.aliases if alias == value), value)
@@ -276,7 +281,7 @@ class Parameter:
     def check(self, value: Any) -> str | None:
         """Return what is wrong with a scalar value of this parameter, or None."""
         try:
-            adapter_of(self).validate_python(value)
+            self.adapter.validate_python(value)
         except ValidationError as error:
             cause = error.errors(include_url=False)[0].get("ctx", {}).get("error", "")
             return self.explain(value, str(cause))
@@ -406,12 +411,6 @@ BY_METRIC = Annotated[
     Field(min_length=1),
     BeforeValidator(lambda value: dict(value) if isinstance(value, tuple) else value),
 ]
-
-
-@lru_cache
-def adapter_of(row: Parameter) -> TypeAdapter[Any]:
-    """Return what checks values of a row alone."""
-    return TypeAdapter(annotation_of(row))
 
 
 Describe = Callable[[str, str, Any], str]
