@@ -3,17 +3,21 @@
 import atexit
 import contextlib
 import functools
+import gc
 import hashlib
+import multiprocessing
 import os
 import shutil
+import signal
 import tempfile
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from importlib import metadata
+from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 VERSION = "0.1.0"  # the one place; CHANGELOG.md says what has changed
 PROGRAM = f"compsim {VERSION}"  # as stored results name it
@@ -49,6 +53,51 @@ def report_progress(things: Sequence[Thing], progress: Progress) -> Iterator[Thi
         progress(number, len(things), "")
         yield thing
     progress(len(things), len(things), "")
+
+
+@contextlib.contextmanager
+def work_beside(work: Callable[[], Thing]) -> Iterator[Callable[[], Thing]]:
+    """Have a copy of this process do some work meanwhile; yield what waits for its result.
+
+    All is done here where that is called if there is one core, threads run, whose locks a copy
+    would take along, the system makes no copies, or the copy dies. What work raises is raised here.
+    """
+    affinity = getattr(os, "sched_getaffinity", None)
+    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
+    is_free = cores > 1 and threading.active_count() == 1
+    here, there = multiprocessing.Pipe(duplex=False)
+    copy = None
+    if is_free and "fork" in multiprocessing.get_all_start_methods():
+        with contextlib.suppress(OSError):  # too many processes
+            copy = multiprocessing.get_context("fork").Process(
+                target=_send_result, args=(work, here, there)
+            )
+            copy.start()
+    there.close()
+
+    def result() -> Thing:
+        if copy:
+            with contextlib.suppress(EOFError, OSError):
+                return here.recv()
+        return work()
+
+    try:
+        yield result
+    finally:
+        here.close()
+        if copy and copy.pid:
+            copy.kill()
+            copy.join()
+
+
+def _send_result(work: Callable[[], Any], here: Connection, there: Connection) -> None:
+    """Send what work returns; Ctrl-C, or the end of who waits for it, ends this silently."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_DFL)
+    here.close()  # so that sending fails where nobody is left to receive
+    gc.freeze()  # else each collection looks at what lives as long as the copy
+    with contextlib.suppress(Exception):  # which the work raises again where it is waited for
+        there.send(work())
 
 
 class CompsimError(Exception):

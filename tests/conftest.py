@@ -8,6 +8,7 @@ import os
 import shutil
 import signal
 import sys
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -107,6 +108,13 @@ def once(base):
         return base / name
 
     return made
+
+
+@pytest.fixture
+def two_cores(monkeypatch):
+    """A copy of the process may work beside it, whatever idle threads other tests have left."""
+    monkeypatch.setattr(threading, "active_count", lambda: 1)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 1}, raising=False)
 
 
 @pytest.fixture

@@ -7,10 +7,11 @@ whole, for its key and for what is wrong with its values, and again when it is u
 
 import itertools
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 from compressor.cases.case import Case
 from compressor.cases.checks import DOUBLES, expand_synonyms, key_of, row_of, stands_for, value_of
@@ -36,7 +37,7 @@ from compressor.cases.yaml_reader import (
     read_file,
     shorten,
 )
-from compressor.program import Progress, no_progress
+from compressor.program import Progress, no_progress, work_beside
 
 MAX_JOBS = 10_000
 NONE_SELECTED = "selects no job; compsim plan without it lists those that there are"
@@ -298,45 +299,80 @@ def _columns(blocks: Sequence[Block]) -> list[str]:
     return [*dict.fromkeys(parts)]
 
 
+class CheckedCases(NamedTuple):
+    """What checks of some cases have found; `keys` of the rest end where one is wrong.
+
+    `values`: of each swept key. `selected`: numbers of the cases to be run. `misfits` are told
+    behind what is `wrong` alone, from which some follow.
+    """
+
+    keys: list[str]
+    values: dict[str, list[Any]]
+    selected: list[int]
+    wrong: Located
+    misfits: Located
+
+
 def _check_cases(
     file: CaseFile, cases: Cases, columns: Sequence[str], only: Test | None, progress: Progress
 ) -> tuple[tuple[str, ...], dict[str, list[Any]], list[int]]:
     """Return the key of each case, its value of each swept key, and the numbers of those selected.
 
-    Raises CaseFileError.
+    Of many cases a copy of this process checks one half. Raises CaseFileError.
     """
+    total, check = len(cases), partial(_check_some, cases, columns, only)
+    if total < MANY_CASES:
+        parts = [check(range(total))]
+    else:
+        for block in cases.blocks:
+            block.mark_cards()
+        half = total // 2
+        with work_beside(lambda: check(range(half, total))) as others:
+            progress(0, total, f"{file.name}: {total} jobs")
+            parts = [check(range(half), lambda done: progress(2 * done, total, "")), others()]
+        progress(total, total, "")
     wrong: Located = {}
-    misfits: Located = {}  # told behind what is wrong alone, from which some follow
-    keys: list[str] = []
-    selected: list[int] = []
-    values: dict[str, list[Any]] = {key: [] for key in columns}
-    total = len(cases)
-    progress = progress if total >= MANY_CASES else no_progress
-    for number, (block, place) in enumerate(cases.places()):
-        if number % 1000 == 0:
-            progress(number, total, "" if number else f"{file.name}: {total} jobs")
-        try:
-            case = block.case(place)
-        except CaseError as error:
-            found = misfits if error.is_misfit else wrong
-            for where, problem in block.locate(error, block.rows_of(place)).items():
-                found.setdefault(where, problem)
-            continue
-        if not (wrong or misfits):
-            keys.append(case.key)
-            for key in columns:
-                values[key].append(axis_value(case, block, place, key))
-            if only is None or is_selected(only, block.given_of(place), case):
-                selected.append(number)
-    progress(total, total, "")
-    wrong |= {where: problem for where, problem in misfits.items() if where not in wrong}
+    for located in (*(part.wrong for part in parts), *(part.misfits for part in parts)):
+        for where, problem in located.items():
+            wrong.setdefault(where, problem)
     problems = [*itertools.islice(wrong.values(), MAX_CONFLICTS)]
     if len(wrong) > MAX_CONFLICTS:
         message = f"{len(wrong)} problems of swept values; the first {MAX_CONFLICTS} are"
         problems.append(Problem("", message, Place(file.path)))
     if problems:
         raise CaseFileError(problems)
-    return tuple(keys), values, selected
+    keys = tuple(key for part in parts for key in part.keys)
+    values = {key: [one for part in parts for one in part.values[key]] for key in columns}
+    return keys, values, [number for part in parts for number in part.selected]
+
+
+def _check_some(
+    cases: Cases,
+    columns: Sequence[str],
+    only: Test | None,
+    numbers: range,
+    progress: Callable[[int], object] = int,
+) -> CheckedCases:
+    """Return what the checks of cases of some numbers find; progress: called with how many."""
+    found = CheckedCases([], {key: [] for key in columns}, [], {}, {})
+    for number in numbers:
+        if number % 1000 == 0:
+            progress(number - numbers.start)
+        block, place = cases.place_of(number)
+        try:
+            case = block.case(place)
+        except CaseError as error:
+            located = found.misfits if error.is_misfit else found.wrong
+            for where, problem in block.locate(error, block.rows_of(place)).items():
+                located.setdefault(where, problem)
+            continue
+        if not (found.wrong or found.misfits):
+            found.keys.append(case.key)
+            for key in columns:
+                found.values[key].append(axis_value(case, block, place, key))
+            if only is None or is_selected(only, block.given_of(place), case):
+                found.selected.append(number)
+    return found
 
 
 def is_selected(only: Test, given: Mapping[str, Any], case: Case) -> bool:

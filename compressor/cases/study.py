@@ -81,10 +81,9 @@ class Block:
             sweep, count = self.sweeps[keys[0]], self.sample.n
             if sweep.is_drawn and count:
                 points = design(sweep.kind, count, len(keys), self.sample.seed)
-                shares = zip(*points, strict=True)
                 made = [
-                    [*map(self.sweeps[key].spread, own)]
-                    for key, own in zip(keys, shares, strict=True)
+                    [*map(self.sweeps[key].spread, own.tolist())]
+                    for key, own in zip(keys, points.T, strict=True)
                 ]
             for key, column in zip(keys, made, strict=True):
                 is_own = self.sweeps[key].path == path_of(key)
@@ -104,6 +103,12 @@ class Block:
         made for a run, a file that has changed would be computed under the key of the old one.
         """
         return cache(mark_path)
+
+    def mark_cards(self) -> None:
+        """Mark every card that is given, so that copies of this process mark them alike."""
+        for key in self.card_keys:
+            for card in self.columns.get(key, [self.given[key]]):
+                self.mark(key, card)
 
     @cached_property
     def numbers(self) -> Sequence[int]:
@@ -452,10 +457,6 @@ class Cases(Sequence[Case]):
         """Return the block of a case, and the number of its combination there."""
         at = bisect_right(self.ends, index)
         return self.blocks[at], self.blocks[at].numbers[index - self.ends[at]]
-
-    def places(self) -> Iterator[tuple[Block, int]]:
-        """Yield the block and the number in it of each case."""
-        return ((block, number) for block in self.blocks for number in block.numbers)
 
     def __getitem__(self, index: Any) -> Any:
         number = range(len(self))[index]

@@ -10,10 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from compressor.cases.yaml_reader import Path, is_number
 from compressor.program import ignore_warnings
+
+if TYPE_CHECKING:
+    import numpy as np
 
 # designs of samples, which draw several keys together
 SAMPLED = ("random", "lhs", "sobol", "saltelli")
@@ -148,8 +151,8 @@ def design_size(kind: str, count: int, keys: int) -> int:
     return count * (keys + 2) if kind == "saltelli" else count
 
 
-def design(kind: str, count: int, keys: int, seed: int) -> list[list[float]]:
-    """Return the points of a sampling design: `count` of `keys` coordinates in [0, 1).
+def design(kind: str, count: int, keys: int, seed: int) -> "np.ndarray":
+    """Return the points of a sampling design: `count` of `keys` coordinates in [0, 1), a row each.
 
     kind: a word of `SAMPLED`. The same seed gives the same points. `random` is uniform, `lhs` a
     Latin hypercube, `sobol` Sobol's sequence, scrambled, whose balance is best where `count` is a
@@ -161,15 +164,15 @@ def design(kind: str, count: int, keys: int, seed: int) -> list[list[float]]:
     import numpy as np
 
     if kind == "saltelli":
-        points = np.array(design("sobol", count, 2 * keys, seed))
+        points = design("sobol", count, 2 * keys, seed)
         a, b = points[:, :keys], points[:, keys:]
         mixed = [np.where(np.arange(keys) == key, b, a) for key in range(keys)]
-        return np.concatenate([a, b, *mixed]).tolist()
+        return np.concatenate([a, b, *mixed])
     generator = np.random.default_rng(seed)
     if kind == "random":
-        return generator.random((count, keys)).tolist()
+        return generator.random((count, keys))
     from scipy.stats import qmc  # takes half a second
 
     sampler = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}[kind](keys, seed=generator)
     with ignore_warnings("The balance properties of Sobol"):
-        return sampler.random(count).tolist()
+        return np.asarray(sampler.random(count))

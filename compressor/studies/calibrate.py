@@ -336,7 +336,7 @@ def calibrate(
     if not jobs.highest:
         what = f"its sensor's band holds no order of {60 * measured.speed:.6g} rpm"
         raise frame.StudyError(f"{path}: {what}: raise sensor.low_pass_Hz")
-    starts = np.array(cases.design("lhs", POINTS_A_KEY * len(unknowns), len(unknowns), SEED))
+    starts = cases.design("lhs", POINTS_A_KEY * len(unknowns), len(unknowns), SEED)
     amplitudes, errors = measured.amplitudes[: jobs.highest], measured.errors[: jobs.highest]
     fit = fit_orders(jobs, amplitudes, errors, starts)
     study = jobs.study

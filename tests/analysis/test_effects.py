@@ -85,16 +85,16 @@ def test_intervals_of_correlations_hold_as_often_as_they_say():
 
 
 def test_only_a_design_is_one():
-    points = np.array(design("saltelli", 8, 3, 1))
+    points = design("saltelli", 8, 3, 1)
     assert effects.saltelli_design(points[:, [2, 0, 1]]) is not None  # in any order of columns
     assert effects.saltelli_design(points[:-1]) is None
-    assert effects.saltelli_design(np.array(design("sobol", 40, 3, 1))) is None
+    assert effects.saltelli_design(design("sobol", 40, 3, 1)) is None
     assert effects.saltelli_design(points.astype(object)) is None
 
 
 def test_blocks_drop_out_whole_and_a_power_of_two_is_left():
     """An unknown point of A, of B, or of a mixed part costs its block."""
-    points = np.array(design("saltelli", 8, 3, 1))
+    points = design("saltelli", 8, 3, 1)
     parts = effects.saltelli_design(points)
     unknown = np.zeros(len(points), bool)
     unknown[[parts.a[1], parts.b[3], parts.mixed[2, 4], parts.mixed[0, 4]]] = True
@@ -109,7 +109,7 @@ def test_blocks_drop_out_whole_and_a_power_of_two_is_left():
 
 def test_failed_runs_do_not_bias_the_indices():
     """A tenth of the points is unknown by chance."""
-    points = np.array(design("saltelli", 512, 2, 1))
+    points = design("saltelli", 512, 2, 1)
     values = points[:, 0] + 2.0 * points[:, 1]
     lost = np.random.default_rng(4).random(values.size) < 0.1
     found = effects.sampled_effects([*points.T], np.where(lost, np.nan, values))
@@ -117,17 +117,17 @@ def test_failed_runs_do_not_bias_the_indices():
     assert found.total == pytest.approx([0.2, 0.8], abs=0.04)
     assert (found.main_ends[0] <= found.main).all()
     assert (found.main_ends[1] >= found.main).all()
-    points = np.array(design("saltelli", 256, 3, 1))
+    points = design("saltelli", 256, 3, 1)
     whole = effects.sampled_effects([*points.T], points[:, 0] + 2.0 * points[:, 1])
     assert (whole.unknown, whole.base) == (0, 0)
     assert whole.total == pytest.approx([0.2, 0.8, 0.0], abs=0.03)
     assert whole.total_ends[1][2] == 0.0  # the third key changes nothing, surely
-    (alone,) = np.array(design("saltelli", 64, 1, 1)).T
+    (alone,) = design("saltelli", 64, 1, 1).T
     assert effects.sampled_effects([alone], alone).total == pytest.approx([1.0], abs=0.03)
 
 
 def test_where_few_blocks_are_whole_ranks_remain():
-    points = np.array(design("saltelli", 16, 6, 1))
+    points = design("saltelli", 16, 6, 1)
     values = points[:, 0].copy()
     values[effects.saltelli_design(points).mixed[0, :10]] = np.nan
     assert effects.sampled_effects([*points.T], values).kind == "rank"

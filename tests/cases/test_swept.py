@@ -1,5 +1,6 @@
 """The grammar of sweeps: how values are made, joined and left out, and what is refused."""
 
+import os
 import tracemalloc
 
 import numpy as np
@@ -8,8 +9,9 @@ from conftest import refused
 from hypothesis import given
 from hypothesis import strategies as st
 
+from compressor.cases import load
 from compressor.cases.checks import value_of
-from compressor.cases.study import points
+from compressor.cases.study import Block, points
 from compressor.cases.swept import design, design_size, sweep_of
 
 ONE = "joint: big_end\n"
@@ -285,3 +287,20 @@ def test_a_sample_that_samples_nothing_is_refused_whatever_else_is_set(read):
     assert "samples nothing" in refused(read, plain, "machine.speed_rpm=300")[0]
     drawn = "joint: both\nclearance_mm: {random: [0.1, 0.2]}\nsample: {n: 4}"
     assert read(drawn, "clearance_mm=0.1").jobs == 1
+
+
+def test_of_many_cases_a_copy_of_the_process_checks_half(read, two_cores, monkeypatch, tmp_path):
+    text, told, build = SAMPLED % ("lhs", "lhs"), [], Block.case
+
+    def ask():
+        study = read(text, only="machine.speed_rpm > 500", progress=lambda *at: told.append(at))
+        wrong = refused(read, text, "spring.stroke_mm=[100, 300]", "clearance_mm=20")
+        return study.keys, study.axes, study.selected, wrong
+
+    alone = ask()
+    monkeypatch.setattr(load, "MANY_CASES", 16)
+    counted = lambda *at: (tmp_path / f"{os.getpid()}.pid").touch() or build(*at)  # noqa: E731
+    monkeypatch.setattr(Block, "case", counted)
+    assert ask() == alone
+    assert told == [(0, 16, "case: 16 jobs"), (0, 16, ""), (16, 16, "")]
+    assert len([*tmp_path.glob("*.pid")]) == 3  # one copy for each time that cases were read

@@ -360,7 +360,7 @@ def test_jobs_without_a_value_are_told():
 
 
 def test_correlations_are_told_with_their_intervals():
-    points = np.array(design("lhs", 40, 2, 1))
+    points = design("lhs", 40, 2, 1)
     columns = {"clearance_mm": points[:, 0], "speed_rpm": points[:, 1]}
     drawn = plan(listed(columns, 1 + points[:, 0] + points[:, 1]))["ranking"]
     words = r"Peak acceleration: \w+ (\S+) \((\S+) to (\S+)\), \w+ (\S+) \("
@@ -388,7 +388,7 @@ def test_keys_that_go_together_are_told():
 
 def test_blocks_of_a_design_with_a_failed_job_are_left_out():
     """y = 1 + x1 + 3 x2, of 64 blocks six with a failed job: the first 32 whole ones count."""
-    points = np.array(design("saltelli", 64, 2, 1))
+    points = design("saltelli", 64, 2, 1)
     columns = {"clearance_mm": points[:, 0], "speed_rpm": points[:, 1]}
     status = np.full(256, "ok", dtype="U7")
     status[[3, 9, 64 + 20, 128 + 30, 192 + 30, 192 + 40, 192 + 50]] = "failed"  # 30 twice

@@ -85,7 +85,7 @@ KEYS = ("rod_mass_kg", "static", "dynamic")
 
 def test_the_indices_of_ishigami_s_function():
     """By Saltelli's closed forms: first order .3139, .4424, 0; total .5576, .4424, .2437."""
-    points = np.array(design("saltelli", 512, 3, 1))
+    points = design("saltelli", 512, 3, 1)
     margin = np.full((len(points), 8), 0.5)
     x, y, z = (2.0 * np.pi * column - np.pi for column in points.T)
     margin[:, 2] = (np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)) / 20.0  # below 1

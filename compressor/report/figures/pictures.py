@@ -5,18 +5,11 @@ user's matplotlibrc nor a user's own figures are touched.
 """
 
 import contextlib
-import gc
 import io
 import itertools
-import multiprocessing
-import os
 import re
-import signal
 import sys
-import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
 import numpy as np
@@ -33,6 +26,7 @@ from matplotlib.ticker import MultipleLocator
 from matplotlib.transforms import Bbox
 
 from compressor.digits import plural
+from compressor.program import work_beside
 from compressor.report.figures.drawing import (
     INCH,
     ROOM,
@@ -109,43 +103,18 @@ def whole_box(painted: Figure, figure: go.Figure) -> Bbox:
 
 
 Made = TypeVar("Made")
-Work = Sequence[Callable[[], Made]]  # what draws a figure each
-TO_DRAW: list[Callable[[], Any]] = []  # of a copy of this process
 
 
-def start_copy(work: Work[Any]) -> None:
-    """Prepare a copy: pickled to it, a figure would lose its arrays. Ctrl-C ends it silently."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    gc.freeze()  # else each collection looks at what lives as long as the copy
-    TO_DRAW[:] = work
-
-
-def draw_numbered(number: int) -> Any:
-    """Return what is drawn of the work that the copy has."""
-    return TO_DRAW[number]()
-
-
-def draw_all(work: Work[Made]) -> list[Made]:
-    """Return what is drawn; say on stderr how much that is.
-
-    Two at a time draw, copies of this process; one after the other where the system makes no
-    copies, or threads run, whose locks a copy would take along.
-    """
+def draw_all(work: Sequence[Callable[[], Made]]) -> list[Made]:
+    """Return what is drawn, two at a time where that can be; say on stderr how much that is."""
     with contextlib.suppress(OSError):
         sys.stderr.write(f"drawing {plural(len(work), 'figure')}\n" * bool(work))
         sys.stderr.flush()
-    affinity = getattr(os, "sched_getaffinity", None)
-    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
-    can_fork = cores > 1 and "fork" in multiprocessing.get_all_start_methods()
-    if can_fork and threading.active_count() == 1 and len(work) > 1:
-        with (  # if a copy dies, such as for want of memory, all is drawn here
-            contextlib.suppress(BrokenProcessPool),
-            ProcessPoolExecutor(
-                2, multiprocessing.get_context("fork"), start_copy, (work,)
-            ) as pool,
-        ):
-            return [*pool.map(draw_numbered, range(len(work)))]
-    return [draw() for draw in work]
+    drawn: list[Any] = [None] * len(work)
+    with work_beside(lambda: [draw() for draw in work[1::2]]) as others:
+        drawn[::2] = [draw() for draw in work[::2]]
+        drawn[1::2] = others()
+    return drawn
 
 
 def paint(figure: go.Figure) -> Figure:
