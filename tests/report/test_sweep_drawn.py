@@ -209,7 +209,9 @@ def test_cells_are_jobs():
     assert [*cells.customdata.ravel()[:5]] == ["k0", "k3", "k6", "k9", "k1"]  # row by row
     assert (panel.x.title.text, panel.y.title.text) == ("clearance (mm)", "speed (rpm)")
     assert cells.colorbar.title.text == "m/s²"
-    assert drawn.name == "map"
+    assert (drawn.name, cells.zmin, cells.zmax) == ("map", 301, 505)
+    nearly = traces(grid(AXES, lambda c, n: 500 + 1e-4 * n))[2]["peak acceleration"]
+    assert nearly.zmax - nearly.zmin == pytest.approx(6 * 5, rel=1e-3)  # bars: noise is no pattern
 
 
 def test_a_metric_that_a_job_lacks_is_drawn():

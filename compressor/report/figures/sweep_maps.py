@@ -62,7 +62,8 @@ def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> go.Figure:
     drawing = sweep_panels.metric_panels(measures, 2.6, "all", "all")
     for panel, measure in zip(drawing.panels, measures, strict=True):
         panel.label("y", "")  # the colours have the unit
-        plot_map(panel, cells, table(measure.of(sweep.data)), measure)
+        bars = measure.bar(sweep.data)
+        plot_map(panel, cells, table(measure.of(sweep.data)), bars, measure)
         mark_cells(panel, cells, status, chaotic)
         scale_map(panel, "x", x, sweep_panels.in_lines(x.words))
         scale_map(panel, "y", y, y.words)
@@ -70,14 +71,17 @@ def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> go.Figure:
     return drawing.figure()
 
 
-def plot_map(panel: Panel, cells: Cells, table: np.ndarray, measure: Measure) -> None:
-    """Draw a measure's cells with their colour scale."""
+def plot_map(
+    panel: Panel, cells: Cells, table: np.ndarray, bars: np.ndarray, measure: Measure
+) -> None:
+    """Draw a measure's cells with their colour scale, on which noise is no pattern."""
     panel.x.showgrid = panel.y.showgrid = False
     low, high = float(np.nanmin(table)), float(np.nanmax(table))
-    top = high if high > low else low + (abs(low) or 1.0)
+    is_log = spans_decades(table)
+    room = 0.0 if is_log else max(0.0, sweep_panels.least_room(table[np.isfinite(table)], bars))
     panel.map(
-        *cells.centres, table, style.palette(COLORS), (low, top), "{}", measure.unit,
-        spans_decades(table), measure.title, sweep_panels.job_keys(cells.keys),
+        *cells.centres, table, style.palette(COLORS), (low - room, high + room), "{}", measure.unit,
+        is_log, measure.title, sweep_panels.job_keys(cells.keys),
     )  # fmt: skip
 
 

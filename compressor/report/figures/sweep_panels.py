@@ -117,21 +117,31 @@ def in_lines(words: Sequence[str]) -> list[str]:
     return [word.replace(" ", "\n") for word in words]
 
 
+def least_room(values: np.ndarray, bars: ArrayLike) -> float:
+    """Return how far an axis, or a scale of colours, goes beyond values at least, on either side.
+
+    So that it spans MIN_BARS error bars and MIN_SHARE of the values: below 0 where these differ by
+    more. values: finite.
+    """
+    bars = np.asarray(bars)
+    bar = float(np.median(bars[np.isfinite(bars)])) if np.isfinite(bars).any() else 0.0
+    least = max(MIN_SHARE * abs(values).max(initial=0.0), MIN_BARS * bar) or 1.0
+    return 0.5 * (least - float(np.ptp(values))) if values.size else 0.0
+
+
 def scale_y(panel: Panel, values: np.ndarray, bars: ArrayLike = ()) -> float:
     """Set the y axis for values, with room at the foot for marks; return the panel's span.
 
-    Logarithmic over decades. The axis spans MIN_BARS error bars and MIN_SHARE of the values at
-    least: those that differ by less stand in its middle.
+    Logarithmic over decades. Values that differ by less than `least_room` tells stand in its
+    middle.
     """
-    bars, values = np.asarray(bars), values[np.isfinite(values)]
-    bar = float(np.median(bars[np.isfinite(bars)])) if np.isfinite(bars).any() else 0.0
+    values = values[np.isfinite(values)]
     low, high = (values.min(), values.max()) if values.size else (0.0, 1.0)
     if spans_decades(values):
         panel.y.type, room = "log", (high / low) ** PANEL_MARGIN
         panel.span("y", low / room, high * room)
         return float(low)
-    least = max(MIN_SHARE * max(abs(low), abs(high)), MIN_BARS * bar) or 1.0
-    room = max(PANEL_MARGIN * (high - low), 0.5 * (least - (high - low)))
+    room = max(PANEL_MARGIN * (high - low), least_room(values, bars))
     panel.span("y", low - room, high + room)
     return float(high - low + 2.0 * room)
 
