@@ -34,7 +34,7 @@ from compressor.cases.groups import (
 )
 from compressor.cases.json_schema import case_schema
 from compressor.cases.keys import path_of, put
-from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS
+from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS, READ_BY
 from compressor.cases.load import load_cases, load_studies
 from compressor.cases.materials import joint_stiffness, paper_notes
 from compressor.cases.optional_groups import Body, Drive, Guide, Lubricant, Rod, Sensor, Wear

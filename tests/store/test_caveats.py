@@ -8,11 +8,13 @@ from conftest import store_cases
 
 from compressor.cases.case import Case
 from compressor.cases.materials import paper_notes
-from compressor.store.caveats import describe_runs
+from compressor.store import read_store, read_studies
+from compressor.store.caveats import describe_runs, job_caveats, run_caveats
 from compressor.store.reader import open_study
 from compressor.store.status import report_job
 
 SOLVE = {"duration_rev": 3, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
+LATER, FLORES = {"settle_rev": 2}, {"law": "flores", "restitution": 0.7}
 STUDY = {
     "joint": "big_end",
     "clearance_mm": 0.2,
@@ -78,7 +80,7 @@ def test_a_stiffness_that_is_given_is_not_the_paper_s():
     ],
 )
 def test_what_is_seen_to_repeat_in_time_is_no_caveat(regime, settled, begin, said):
-    found = describe_runs(*map(np.atleast_1d, (regime, settled, begin, 1e-4)))
+    found = describe_runs(*map(np.atleast_1d, (regime, settled, begin, 1e-4, False)))
     assert bool(found) == bool(said)
     assert all(text.startswith(said) for text in found)
 
@@ -86,7 +88,21 @@ def test_what_is_seen_to_repeat_in_time_is_no_caveat(regime, settled, begin, sai
 def test_caveats_count_the_jobs_that_they_are_true_of():
     found = describe_runs(
         np.array(["periodic", "periodic", "chaotic"]), np.array([2.0, 1.0, 2.0]), np.ones(3),
-        np.array([0.2, 0.1, math.nan]),
+        np.array([0.2, 0.1, math.nan]), np.zeros(3, bool),
     )  # fmt: skip
     assert [text.partition(": ")[0] for text in found] == ["1 of 3 jobs", "2 of 3 jobs"]
     assert "at worst 20 % of its samples" in found[1]
+
+
+def test_a_law_that_remembers_an_impact_of_the_start_up_says_so(tmp_path):
+    """flores gave 7405, 7827 and 7573 N for three starts, each as periodic, with tiny bars."""
+    starts = {"joint": "big_end", "clearance_mm": 0.2, "load": "gas", "solve": SOLVE | LATER}
+    starts |= {"contact": FLORES, "initial_offset_mm": {"big_end_x": [-0.19, 0]}}
+    store_cases(tmp_path, starts=starts, impact=starts | {"contact": {}})
+    stored = read_store(tmp_path / "results")
+    for study, said in zip(read_studies(tmp_path / "results"), (False, True), strict=True):
+        places = stored.find(study.keys)
+        peaks = stored.numbers(places, ["peak_contact_force"])["peak_contact_force"][:, 0]
+        assert (abs(peaks[1] / peaks[0] - 1.0) > 0.03) == said
+        for texts in (run_caveats(stored, study), job_caveats(stored, places[0])):
+            assert ("numbers depend on how the run began" in " ".join(texts)) == said
