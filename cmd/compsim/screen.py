@@ -214,8 +214,6 @@ def caution(
 def say_machines(machines: "Mapping[str, MachineDescription]") -> None:
     """Report what studies, by name, say of their machines: loads, power, pressures, pins."""
     for study, machine in machines.items():
-        part = f" (by {machine.looked_at} of {machine.jobs} jobs)"
-        is_part = machine.looked_at < machine.jobs
-        say(f"{study}: its machine, without clearance{part if is_part else ''}")
+        say(f"{study}: its machine, without clearance{machine.part}")
         for line in align_columns(machine.lines()):
             say("\n".join(wrap_value(f"  {line}")))

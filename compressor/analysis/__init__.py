@@ -13,7 +13,12 @@ from compressor.analysis.effects import (
     saltelli_design,
     sampled_effects,
 )
-from compressor.analysis.machine_numbers import MachineDescription, describe_cases, describe_machine
+from compressor.analysis.machine_numbers import (
+    MachineDescription,
+    describe_cases,
+    describe_machine,
+    draw_jobs,
+)
 from compressor.analysis.margins import mean_peak
 from compressor.analysis.runs import (
     CLEARANCES,

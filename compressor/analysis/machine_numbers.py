@@ -203,6 +203,12 @@ class MachineDescription:
                 found.setdefault(number.key, number.remark)
         return found
 
+    @property
+    def part(self) -> str:
+        """Return of how many jobs it speaks, in words; "" of all."""
+        is_part = self.looked_at < self.jobs
+        return f" (by {self.looked_at} of {self.jobs} jobs)" if is_part else ""
+
 
 LOADS = ("gas.discharge_MPa", "gas.indicator.head", "gas.indicator.crank")
 # key that a caution or a remark is about -> keys of others that it explains, too
@@ -218,13 +224,16 @@ EXPLAINED = {
 }  # fmt: skip
 
 
+def draw_jobs(numbers: Sequence[int], most: int = MAX_CASES) -> list[int]:
+    """Return numbers of jobs, all or of more than `most` both ends of the axes and a fixed draw."""
+    count = len(numbers)
+    drawn = random.Random(0).sample(range(count), most) if count > most else range(count)
+    return [numbers[place] for place in sorted({0, *drawn, count - 1} if count else ())]
+
+
 def sample_cases(study: Study, most: int) -> list[Case]:
-    """Return the selected cases of a study; of more than `most` both ends and a fixed draw."""
-    numbers: Sequence[int] = study.selected
-    if len(numbers) > most:
-        drawn = random.Random(0).sample(numbers, most)
-        numbers = sorted({numbers[0], *drawn, numbers[-1]})  # the ends of an axis
-    return [study.cases[number] for number in numbers]
+    """Return the selected cases of a study, or some of them, as `draw_jobs`."""
+    return [study.cases[number] for number in draw_jobs(study.selected, most)]
 
 
 def describe_machine(study: Study) -> MachineDescription:
@@ -233,12 +242,12 @@ def describe_machine(study: Study) -> MachineDescription:
     Takes some milliseconds a machine; a sweep of clearances has one.
     """
     cases = sample_cases(study, MAX_CASES)
-    return MachineDescription(machine_numbers(cases), len(cases), len(study.selected))
+    return describe_cases(cases, len(study.selected))
 
 
-def describe_cases(cases: Sequence[Case]) -> MachineDescription:
-    """Return what cases say of their machine."""
-    return MachineDescription(machine_numbers(cases), len(cases), len(cases))
+def describe_cases(cases: Sequence[Case], jobs: int) -> MachineDescription:
+    """Return what cases, of so many jobs, say of their machine."""
+    return MachineDescription(machine_numbers(cases), len(cases), jobs)
 
 
 def machine_numbers(cases: Sequence[Case]) -> tuple[MachineNumber, ...]:

@@ -5,13 +5,12 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from compressor.analysis import describe_cases
-from compressor.cases import DOUBLES, keys_of, reads, row_of, stands_for, value_of
+from compressor.analysis import describe_cases, draw_jobs
+from compressor.cases import DOUBLES, Case, keys_of, reads, row_of, stands_for, value_of
 from compressor.digits import setting
 from compressor.report.figures.sweep_data import name_in_words
 from compressor.store import Stored, StoredStudy
 
-MAX_CASES = 50  # of a study whose machine is described
 MAX_VALUES = 10  # of a swept key that are listed
 NOT_ASSUMED = ("name", "output", "solve", "initial_offset_mm", "healthy_clearance_mm")
 
@@ -26,11 +25,10 @@ def find_inputs(stored: Stored, study: StoredStudy) -> list[tuple[str, Lines]]:
     Nothing where this version knows no case of it.
     """
     places = [place for place in stored.find([*study.keys]).tolist() if place >= 0]
-    places = places[:: -(-len(places) // MAX_CASES) or 1]
-    cases = [case for place in places if (case := stored.case_at(place))]
+    cases = [case for place in draw_jobs(places) if (case := stored.case_at(place))]
     if not cases:
         return []
-    machine = describe_cases(cases)
+    machine = describe_cases(cases, study.jobs)
     swept = {part for axis in study.axes for part in (axis.key, *stands_for(axis.key))}
     fixed = {
         key: value
@@ -41,13 +39,13 @@ def find_inputs(stored: Stored, study: StoredStudy) -> list[tuple[str, Lines]]:
     named |= {key.rpartition(".")[0] for key in named}
     given = {key: value for key, value in fixed.items() if key in named}
     assumed = {
-        key: value
+        key: spell_ends(key, value, cases)
         for key, value in fixed.items()
         if key not in given and key.partition(".")[0] not in NOT_ASSUMED and reads(cases[0], key)
     }
     axes = {axis.key: [*dict.fromkeys(axis.values)] for axis in study.axes}
     return [
-        ("The machine without clearance, by what was given", machine.lines()),
+        ("The machine without clearance, by what was given" + machine.part, machine.lines()),
         ("Implausible", [*machine.remarks().items()]),
         ("Given", by_group(given)),
         ("Swept", by_group(axes)),
@@ -61,8 +59,7 @@ def by_group(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     for key, value in values.items():
         group, _, name = key.partition(".") if "." in key else ("", "", key)
         name, _, part = name.partition(".")  # such as pin_radius_mm.small_end
-        row = row_of(key)
-        unit = (row.unit or "") if row else ""
+        unit = unit_of(key)
         if key in HALVES and isinstance(value, int | float):
             name, value = HALVES[key].rpartition(".")[2], 2.0 * value
         words = name_in_words(re.sub("_(N_per_mm15|percent)$", "", name), unit)
@@ -70,6 +67,21 @@ def by_group(values: Mapping[str, Any]) -> list[tuple[str, str]]:
         text = f"{words} {spell_values(value, unit)}"
         found.setdefault(name_in_words(group, "mm") or "scene", []).append(text)
     return [(group, "; ".join(words)) for group, words in found.items()]
+
+
+def spell_ends(key: str, value: Any, cases: Sequence[Case]) -> Any:
+    """Return a value; where it follows from a swept one, the least and the greatest as text."""
+    if not isinstance(value, int | float):
+        return value
+    ends = [value, *(value_of(case, key) for case in cases if reads(case, key))]
+    low, high = min(ends), max(ends)
+    return value if low == high else f"{spelt(low, '')} to {spelt(high, unit_of(key))}"
+
+
+def unit_of(key: str) -> str:
+    """Return a key's unit; "" without one."""
+    row = row_of(key)
+    return (row.unit or "") if row else ""
 
 
 def spell_values(value: Any, unit: str) -> str:

@@ -20,7 +20,7 @@ from compressor.analysis.runs import CLEARANCES, FAULTS, case_of, label
 from compressor.cases import Case, load_cases, load_studies
 from compressor.program import CompsimWarning
 from compressor.reasons import Reason
-from compressor.report import interactive, write_report
+from compressor.report import inputs, interactive, write_report
 from compressor.report.figures import FIGURES, pictures
 from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.table import spell
@@ -346,16 +346,19 @@ def test_a_sweep_is_drawn_over_the_crank_angle(tmp_path):
     assert "vibration over crank angle and clearance_mm" not in text
 
 
-def test_a_study_says_what_was_given_swept_and_assumed(own, tmp_path):
+def test_a_study_says_what_was_given_swept_and_assumed(own, tmp_path, monkeypatch):
     file = tmp_path / "fed.yaml"
     file.write_text(
         "load: gas\njoint: big_end\nclearance_mm: 0.2\n"
-        "machine: {stroke_mm: 240, rod_mass_kg: [3, 5], pin_radius_mm: 10}\n"
+        "machine: {stroke_mm: 240, rod_mass_kg: [3, 4, 5], pin_radius_mm: 10}\n"
     )
+    monkeypatch.setattr(inputs, "draw_jobs", lambda jobs: [jobs[0], jobs[-1]])
     store(own, file, overrides=[*SHORT, *DRAFT])
     write_report(own, tmp_path / "out", studies=["fed"])
     text = section(tmp_path / "out", "study-fed")
-    _, text = text.split("Inputs The machine without clearance, by what was given ")
+    _, text = text.split(
+        "Inputs The machine without clearance, by what was given (by 2 of 3 jobs) "
+    )
     told, text = text.split(" Given ")
     given, text = text.split(" Swept ")
     swept, text = text.split(" Not given: values of the program ")
@@ -364,7 +367,8 @@ def test_a_study_says_what_was_given_swept_and_assumed(own, tmp_path):
     # the stroke and the pin are the program's own values, too, but the file gives them
     for words in ("load gas", "clearance 0.2 mm", "stroke 240 mm", "pin radius 10 mm"):
         assert (words in given, words in assumed) == (True, False)
-    assert swept == "machine rod mass 3, 5 kg"
+    assert swept == "machine rod mass 3, 4, 5 kg"
+    assert "rod inertia 0.09 to 0.15 kg m2" in assumed  # not that of one job
     for words in ("reciprocating mass 14 kg", "speed 500 rpm", "suction 0.105 MPa", "law impact"):
         assert (words in given, words in assumed) == (False, True)
     assert "rod mass" not in assumed
