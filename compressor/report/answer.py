@@ -22,7 +22,13 @@ from compressor.digits import UNKNOWN, is_known, setting
 from compressor.metrics import BARRED, JOINTS
 from compressor.outcome import Regime
 from compressor.program import PROGRAM, library_versions
-from compressor.report.figures.sweep_data import Measure, measures, name_in_words, swept_values
+from compressor.report.figures.sweep_data import (
+    Measure,
+    differ_beyond_bars,
+    measures,
+    name_in_words,
+    swept_values,
+)
 from compressor.report.page import (
     Cell,
     PageTable,
@@ -314,7 +320,7 @@ def finding(
     if len(values) == 1:
         return MetricChange(title, "", "", text(high), "", "", 0.0, always)
     least, most = float(values[low]), float(values[high])
-    if most - least <= np.nansum([bars[high], bars[low]]):
+    if not differ_beyond_bars(values[sure], bars[sure]):
         same = (
             "the same in all jobs within its error bars"
             if len(sure) == len(values)

@@ -192,7 +192,7 @@ AXES = {"clearance_mm": [0.1, 0.2, 0.4, 0.5], "speed_rpm": [300.0, 400.0, 500.0]
 
 
 def traces(data):
-    _, drawn = draw_sweep(data)  # the ranking is the first
+    *_, drawn = draw_sweep(data)  # the ranking is the first
     panel = panels_of(drawn.figure)[0]
     return drawn, panel, by_name(panel)
 
@@ -350,6 +350,10 @@ def test_bars_and_caption_are_the_exact_shares():
     panel = panels_of(drawn.figure)[0]
     assert panel.y.ticktext == ("peak acceleration", "rms acceleration")
     assert panel.x.title.text == "share of variance (%)"
+    noise = plan(grid(MIXED, lambda c, n, load: 500 + c + n + load))["ranking"]  # in bars of 1 %
+    assert [trace.y.size for trace in panels_of(noise.figure)[0].traces] == [1, 1]
+    why = "too few values are known or all are the same within their error bars"
+    assert (f"not ranked, as {why}", "peak acceleration") in noise.numbers
 
 
 def test_jobs_without_a_value_are_told():

@@ -153,8 +153,8 @@ def draw_ranked(
     numbers += [("first whole blocks of the design", f"{min(bases):,}")] if bases else []
     numbers += [(f"points of a metric that are not known within their error bars, and {how}",
                  f"up to {most}")] * bool(most)  # fmt: skip
-    numbers += [("not ranked, as too few values are known or all are the same", ", ".join(left))
-                ] * bool(left)  # fmt: skip
+    why = "too few values are known or all are the same within their error bars"
+    numbers += [(f"not ranked, as {why}", ", ".join(left))] * bool(left)
     sentence = {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS + spell_correlated(sweep)}[
         kind
     ]

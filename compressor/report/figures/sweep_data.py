@@ -96,6 +96,14 @@ def measures(data: xr.Dataset, units: Units = "usual") -> list[Measure]:
     return [one.read_in(units) for one in stored if not np.isnan(one.of(data)).all()]
 
 
+def differ_beyond_bars(values: np.ndarray, bars: np.ndarray) -> bool:
+    """Return whether the least and the greatest value are apart by more than their error bars."""
+    if np.isnan(values).all():
+        return False
+    low, high = np.nanargmin(values), np.nanargmax(values)
+    return bool(np.ptp(values.flat[[low, high]]) > np.nansum(bars.flat[[low, high]]))
+
+
 def swept_axes(study: xr.Dataset) -> list[str]:
     """Return the axes, of a list of jobs the coordinates, that have more than one value."""
     if study["status"].dims != ("job",):

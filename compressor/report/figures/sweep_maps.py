@@ -18,6 +18,7 @@ from compressor.report.figures.sweep_data import (
     PlottedAxis,
     PlottedSweep,
     coarse,
+    differ_beyond_bars,
     spans_decades,
 )
 
@@ -110,11 +111,16 @@ Ranking = dict[Measure, analysis.Effects]
 
 
 def ranking(sweep: PlottedSweep, measures: Sequence[Measure]) -> Ranking:
-    """Return the effects of a sweep's axes, of one kind, on each measure known well enough."""
+    """Return the effects of a sweep's axes, of one kind, on each measure known well enough.
+
+    What differs by no more than its error bars is noise, and has none.
+    """
     columns = [axis.values for axis in sweep.axes]
     found = {}
     for measure in measures:
         values = sweep.known(measure)
+        if not differ_beyond_bars(values, measure.bar(sweep.data)):
+            continue
         if sweep.is_grid:
             effects = analysis.grid_effects(values)
         else:
