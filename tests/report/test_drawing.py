@@ -56,6 +56,7 @@ def test_a_csv_has_every_number_once(drawing):
     assert cosine == pytest.approx(np.cos(np.radians(X)), abs=1e-7)
     assert columns["3: peak (kN)"][:4] == ("1", "10", "100", "")
     assert columns["3: job"][:5] == ("a", "b", "c", "d", "")
+    assert columns["4: main effect"][:2] == ("speed", "clearance")  # not 0.25 and 0.75
     assert columns["4: jobs: below"][:2] == ("0.1", "0.2")
     assert columns["4: jobs: above"][:2] == ("0.3", "0.4")
 

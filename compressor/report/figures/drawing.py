@@ -456,8 +456,12 @@ def as_csv(figure: go.Figure) -> str:
 
 
 def points(trace: Trace) -> tuple[np.ndarray, np.ndarray, *tuple[tuple[str, np.ndarray], ...]]:
-    """Return x and y of a trace's points, and what else is known of them by its name."""
+    """Return x and y of a trace's points, and what else is known of them by its name.
+
+    y of bars is that of their tick, which those of a row stand beside.
+    """
     x, y = np.asarray(trace.x, float), np.asarray(trace.y, float)
+    y = np.round(y) if isinstance(trace, go.Bar) else y
     if isinstance(trace, go.Heatmap):
         values = trace.z.ravel() if trace.text is None else 10.0 ** trace.z.ravel()
         title = one_line(trace.colorbar.title.text or "") or "value"
