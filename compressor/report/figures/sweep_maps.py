@@ -150,13 +150,16 @@ def draw_ranking(sweep: PlottedSweep, found: Ranking) -> go.Figure:
     each = 0.26 * len(found) + 0.75
     drawing, _ = make_grid(rows, columns, rows * each + 0.7, len(order), share_y="all")
     correlated = any(effects.total is None for effects in found.values())
+    least, most = (-1.0, 1.0) if correlated else (0.0, 100.0)  # estimates go beyond shares
+    ends = [part(one, n, name) for one in found.values() for n in order for name in (MAIN, TOTAL)]
+    low, high = min(least, np.nanmin(ends)), max(most, np.nanmax(ends))
     for panel, axis in zip(drawing.panels, order, strict=True):
         plot_bars(panel, list(found.values()), axis)
         panel.title = sweep.axes[axis].phrase
         panel.x.title = RANK if correlated else "share of variance (%)"
-        panel.span("x", -1.05 if correlated else 0.0, 1.05 if correlated else 105.0)
+        panel.span("x", 1.05 * low, 1.05 * high)
         panel.y.showgrid = False
-        if correlated:
+        if low < 0.0:
             panel.rule(style.LineStyle("#606060", linewidth=0.8), x=0.0)
     first = drawing.panels[0]
     first.name_ticks("y", [measure.title for measure in found])
@@ -193,15 +196,13 @@ def part(effects: analysis.Effects, axis: int, name: str) -> tuple[float, float,
 def spell_strongest(sweep: PlottedSweep, effects: analysis.Effects) -> str:
     """Return the two strongest axes and what each does, with its interval where it has one.
 
-    A share of the spread, cut where sampling has it below 0 or above 1, or a correlation.
+    A share of the spread, as it is estimated: also below 0 or above 1. Or a correlation.
     """
     form, sign = (".2f", "") if effects.total is None else (".0f", " %")
     texts = []
     for axis in order_of(effects)[:2]:
         ends = part(effects, axis, RANK if effects.total is None else TOTAL)
-        value, low, high = (
-            f"{np.clip(end, -100.0 if not sign else 0.0, 100.0):{form}}" for end in ends
-        )
+        value, low, high = (f"{end:z{form}}" for end in ends)
         between = "" if math.isnan(ends[1]) else f" ({low} to {high})"
         texts.append(f"{sweep.axes[axis].phrase} {value}{between}{sign}")
     return ", ".join(texts).replace("-", "−")
