@@ -49,8 +49,8 @@ def find(config, over, folder, jobs, units, as_json, quiet, **asked) -> int:
 
     VALUE of --first is in SI, or has a unit. CONFIG must give one case with the key set. The answer
     of --first is an interval: the comparison is false at its lower end and true at its upper end.
-    The answer of --greatest and --least is the best point. Each point has a row: yes or no, or how
-    it compares with the best.
+    The answer of --greatest and --least is the best point looked at. Each point has a row: yes or
+    no, or how it compares with the best.
     Points that error bars cannot decide, or whose jobs failed, are open, inside the interval. Only
     the first change is narrowed down; the scan misses two changes between two of its points.
     For a chaotic motion the mean of a peak over revolutions counts.

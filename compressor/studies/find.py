@@ -301,6 +301,7 @@ def find_extremum(
 
     The points are at `shares`. Between the two neighbours of that,
     minimize_scalar(method="bounded") goes on until its argument is known to `tolerance`, a share.
+    Then the gaps beside the best point are halved, as that may have ended at a lesser extremum.
     Points that say nothing count as the worst one that is known.
     """
     points = sorted(evaluate(shares), key=place)
@@ -322,7 +323,23 @@ def find_extremum(
     bounds = (points[max(at - 1, 0)].share, points[min(at + 1, len(points) - 1)].share)
     minimize_scalar(cost_at, bounds=bounds, method="bounded",
                     options={"xatol": tolerance, "maxiter": MAX_POINTS})  # fmt: skip
-    return bracket_best(known.values(), factor)
+    while True:
+        answer = bracket_best(known.values(), factor)
+        middles = halves_beside_best(answer, tolerance)
+        if not middles or len(known) + len(middles) > len(points) + MAX_POINTS:
+            return answer
+        known |= {point.share: point for point in evaluate(middles)}
+
+
+def halves_beside_best(answer: SearchResult, tolerance: float) -> list[float]:
+    """Return the middles of gaps beside the best point, wider than `tolerance`, to a worse one."""
+    points, best = answer.points, answer.best
+    return [
+        0.5 * (left.share + right.share)
+        for left, right in pairwise(points)
+        if best in (left, right) and right.share - left.share > tolerance * (1.0 + 1e-9)
+        and not {left, right} <= {*answer.within}
+    ]  # fmt: skip
 
 
 def bracket_best(known: Iterable[Point], factor: float) -> SearchResult:
@@ -412,7 +429,9 @@ def list_answer(
     yield f"{goal.name} {goal.sign}{limit}: {answer.kind}"
     head = {"at": f"{answer.best.argument:.9g}"} if answer.best else {}
     head["between" if is_limit else "worse from"] = " and ".join(ends)
-    head["scan"] = f"{question.scan} points {step}: finer changes may be missed"
+    value = "lesser" if goal.sign == "least" else "greater"
+    missed = "finer changes" if is_limit else f"a {value} value between points"
+    head["scan"] = f"{question.scan} points {step}: {missed} may be missed"
     head["jobs"] = f"{len(answer.points)}, {answer.run_now} of them run now, in study "
     head["jobs"] += f"{answer.study} of {folder}"
     yield from digits.align_columns(head.items())
