@@ -92,10 +92,11 @@ def swept_column(key: str, values: Sequence[Any]) -> tuple["np.ndarray", dict[st
 
 
 def in_words(value: Any) -> str:
-    """Return a swept value in words: 0.2, big_end, true; several with commas, "" for none."""
+    """Return a swept value as case files have it: 0.2, true; several with commas, "" for none."""
     if isinstance(value, tuple | list):
         return ", ".join(map(in_words, value))
-    return "" if value is None else str(value).lower()
+    text = "" if value is None else str(value)
+    return text.lower() if isinstance(value, bool) else text
 
 
 def coordinate_names(keys: Sequence[str]) -> dict[str, str]:
@@ -297,21 +298,23 @@ def find_axis(folder: Folder, study: StoredStudy, name: str) -> Axis:
 
 
 def find_value(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]:
-    """Return the key and the value of an axis that `axis=value` means. Raises WrongName."""
+    """Return an axis' key and value that `axis=value` means, in any case. Raises WrongName."""
     name, equals, text = word.partition("=")
     if not equals or not text:
         raise WrongName(folder, f"{word!r} is no AXIS=VALUE of {study.name}", _name_axes(study))
     axis = find_axis(folder, study, name)
     row = row_of(axis.key)
     text = row.choice_of(text) if row else text
-    meant = {in_words(value): value for value in axis.values}
+    words = {in_words(value): value for value in axis.values}
+    meant = {one.lower(): value for one, value in words.items()} | words
     numbers = [value for value in axis.values if isinstance(value, int | float)]
     with contextlib.suppress(ValueError):
         near = min(numbers, key=lambda value: abs(value - float(text)), default=math.nan)
         if math.isclose(near, float(text), rel_tol=AS_PRINTED):
             meant.setdefault(text, near)
-    if text in meant:
-        return axis.key, meant[text]
+    for one in (text, text.lower()):
+        if one in meant:
+            return axis.key, meant[one]
     problem = f"no job of {study.name} has {axis.key}={text}"
     raise WrongName(folder, problem, f"there are {_name_values(axis.values)}")
 

@@ -83,7 +83,8 @@ SAMPLED = named(
     [f"dd{n:02}" for n in range(20)],
     is_grid=False,
 )
-WORDS = named("words", {"joint": ("none", "both"), "friction": (True, False)}, "efgh")
+WORDS = {"joint": ("none", "both"), "friction": (True, False), "solve.method": ("RODAS",)}
+WORDS = named("words", WORDS, "efgh")
 ONE = named("one", {}, ["beef"])
 KNOWN = [WEAR, SAMPLED, WORDS, ONE]
 
@@ -100,7 +101,7 @@ def found(*words):
         (["wear", "rod_mass_kg=4.70", "clearance_mm=.2"], "ab22"),
         (["wear", "clearance_mm=1e-3", "rod_mass_kg=3.0"], "cc31"),
         (["drawn", "clearance_mm=0.07"], "dd06"),
-        (["words", "fault=both", "friction=false"], "h"),
+        (["words", "fault=Both", "friction=false", "method=RODAS"], "h"),
         (["one"], "beef"),
     ],
 )
@@ -115,6 +116,8 @@ def test_what_is_said_where_no_one_job_is_meant():
     few = "no job of drawn has clearance_mm=0.123; there are 0.01, 0.02, 0.03, 0.04, 0.05, …"
     with pytest.raises(WrongName, match=few):
         found("drawn", "clearance_mm=0.123")
+    with pytest.raises(WrongName, match="there are RODAS$"):
+        found("words", "method=rodos")
 
 
 def test_studies_by_name():
