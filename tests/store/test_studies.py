@@ -116,7 +116,7 @@ def test_what_is_said_where_no_one_job_is_meant():
     few = "no job of drawn has clearance_mm=0.123; there are 0.01, 0.02, 0.03, 0.04, 0.05, …"
     with pytest.raises(WrongName, match=few):
         found("drawn", "clearance_mm=0.123")
-    with pytest.raises(WrongName, match="there are RODAS$"):
+    with pytest.raises(WrongName, match=r"there are RODAS$"):
         found("words", "method=rodos")
 
 
