@@ -39,7 +39,7 @@ def compare(record, names, folder, hints, output, as_json, quiet) -> int:
     rms ratio    of the record over the job: 1 is as strong
 
     A number's error, behind +-, is the standard error by the record's revolutions; it needs at
-    least three. A unit or a speed that was perhaps mistaken is named. A file does not say where
+    least three. A unit or a speed perhaps mistaken in a file is named. A file does not say where
     its sensor was; --json has the jobs' places.
     """
     if output and Path(output).suffix not in KINDS:

@@ -285,7 +285,8 @@ def compare_record(
         text = f"none of the {len(wanted)} jobs has a sensor's record of two revolutions"
         raise frame.StudyError(f"{text}: run them with body: true, sensor: true and series kept")
     jobs.sort(key=lambda job: np.nan_to_num(job.likeness["difference"].value, nan=math.inf))
-    remarks = (*record.remarks, *find_mistakes(mine.rpm, jobs))
+    mistakes = () if key else find_mistakes(mine.rpm, jobs)  # a stored job's are known to be none
+    remarks = (*record.remarks, *mistakes)
     return Comparison(
         name, remarks, mine, own[mine.highest], mine.highest, tuple(jobs),
         len(wanted) - len(jobs),
@@ -388,11 +389,11 @@ CAPTION = (
 
 
 def draw_comparison(found: Comparison) -> report.PlotlyFigure:
-    """Return the four panels of a comparison, the record's curves in black."""
+    """Return the four panels of a comparison, the record in black, what is more alike on top."""
     drawing, grid = report.make_grid(2, 2, 7.4)
-    shown = [(found.name, found.curves, RECORD), *(
-        (f"{job.key[:KEY_DIGITS]}: {job.what}", job.curves, line)
-        for job, line in zip(found.jobs[:MAX_DRAWN], style.CYCLE, strict=False)
+    shown = [("record", found.curves, RECORD), *(
+        (f"{job.key[:KEY_DIGITS]}: {job.what}", job.curves, replace(line, zorder=2.9 - 0.1 * rank))
+        for rank, (job, line) in enumerate(zip(found.jobs[:MAX_DRAWN], style.CYCLE, strict=False))
     )]  # fmt: skip
     (mean, segments), (orders, envelope) = grid
     degrees = np.arange(360) + 0.5

@@ -63,6 +63,7 @@ def test_a_unit_or_a_speed_that_was_perhaps_mistaken_is_named(folder, compare, e
         told = f"the rms is {times} times the job's: m/s2 were perhaps read as {unit}; check --unit"
         assert told in compare(path, folder[1], *words, unit)
     assert "perhaps" not in compare(path, folder[1], *words, "in/s2")
+    assert "perhaps" not in compare(folder[2]["loud noise"], folder[2]["0.1 mm"])  # 5.9 times
     quieter = compare(path, folder[2]["no friction"], *words, "g")  # of 0.57 times the rms
     assert "times the job's: m/s2 were perhaps read as g; check --unit" in quieter
     faster = compare(path, folder[1], "--channel", "1", "--unit", "m/s2", "--rpm", "900",
@@ -77,7 +78,7 @@ def test_numbers_say_how_far_a_record_is_off(folder, compare, tmp_path):
     """And the figure's table has the curves of both."""
     found = json.loads(compare(folder[1], "others", "--json", "-o", tmp_path / "x.csv"))
     head = (tmp_path / "x.csv").read_text(encoding="utf-8").partition("\n")[0]
-    assert f"(b): {folder[1]}: peak and rms of 10° segments (m/s²)" in head
+    assert "(b): record: peak and rms of 10° segments (m/s²)" in head
     jobs = {job["key"]: job for job in found["jobs"]}
     for name, key in folder[2].items():
         for (number, tolerance), value in zip(TOLERANCE.items(), OTHERS[name][1], strict=True):
