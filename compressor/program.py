@@ -2,6 +2,7 @@
 
 import atexit
 import contextlib
+import ctypes
 import functools
 import gc
 import hashlib
@@ -9,6 +10,7 @@ import multiprocessing
 import os
 import shutil
 import signal
+import sys
 import tempfile
 import threading
 import warnings
@@ -28,6 +30,7 @@ THREAD_VARIABLES = (
     "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS",
     "BLIS_NUM_THREADS", "NUMBA_NUM_THREADS", "NUMEXPR_NUM_THREADS",
 )  # fmt: skip
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
 MAX_WORD_LENGTH = 100  # characters of a word that others are compared with
 
 
@@ -90,8 +93,15 @@ def work_beside(work: Callable[[], Thing]) -> Iterator[Callable[[], Thing]]:
             copy.join()
 
 
+def die_with_parent() -> None:
+    """Have the system kill this process when its parent dies, even amid compiled code (Linux)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
 def _send_result(work: Callable[[], Any], here: Connection, there: Connection) -> None:
     """Send what work returns; Ctrl-C, or the end of who waits for it, ends this silently."""
+    die_with_parent()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_DFL)
     here.close()  # so that sending fails where nobody is left to receive

@@ -1,7 +1,6 @@
 """Worker processes from the inside: the loader that makes them, their limits, batches of jobs."""
 
 import contextlib
-import ctypes
 import gc
 import os
 import signal
@@ -14,7 +13,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
-from compressor.program import CompsimError
+from compressor.program import CompsimError, die_with_parent
 from compressor.reasons import Reason
 from compressor.store import StoreError
 
@@ -23,7 +22,6 @@ MAX_TEXT = 20_000  # characters of a traceback
 ENDING = [signal.SIGINT, signal.SIGTERM]
 if hasattr(signal, "SIGHUP"):  # not on Windows
     ENDING.append(signal.SIGHUP)
-PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 Store = Callable[[list[Any]], list[Any]]  # of results; returns what is sent home for each
 
@@ -150,8 +148,7 @@ def serve_batches(
 
 def settle() -> None:
     """Make this process a worker: its end, signals and streams."""
-    if sys.platform == "linux":  # die when the parent does, even amid compiled code
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    die_with_parent()
     for number in (signal.SIGINT, signal.SIGHUP):  # Ctrl-C reaches all: the parent ends us
         signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # ignored, exit codes would be lost
