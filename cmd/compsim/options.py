@@ -49,11 +49,33 @@ results = click.option(
 set_keys = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key in all case files."
 )
+
+
+def join_conditions(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) -> str:
+    """Return the condition under which all of some hold; "" of none."""
+    return " and ".join(f"({text})" for text in texts) if texts[1:] else "".join(texts)
+
+
+def read_shard(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
+    """Return (I, N) of I/N with 1 <= I <= N. Raises BadParameter for other text."""
+    if text is None:
+        return None
+    number, of = text.partition("/")[::2]
+    if not (number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of)):
+        raise click.BadParameter(f"{text!r} is no I/N with 1 <= I <= N, such as 2/8")
+    return int(number), int(of)
+
+
 only = click.option(
     "--only",
     type=TEXT,
+    multiple=True,
+    callback=join_conditions,
     metavar="COMPARISON",
     help="Take only jobs with this, as 'clearance_mm < 0.2'.",
+)
+shard = click.option(
+    "--shard", metavar="I/N", callback=read_shard, help="Take part I of N; others run the rest."
 )
 max_jobs = click.option(
     "--max-jobs", type=COUNT, default=MAX_JOBS, help="Refuse a case file with more jobs than this."

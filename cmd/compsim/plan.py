@@ -23,8 +23,9 @@ FIRST = 5  # missing jobs that are listed
 @options.set_keys
 @options.only
 @options.max_jobs
+@options.shard
 @options.as_json
-def plan(configs, folder, jobs, as_json, **how) -> int:
+def plan(configs, folder, jobs, shard, as_json, **how) -> int:
     """Count the jobs of a run, and estimate its time and bytes.
 
     \b
@@ -37,6 +38,7 @@ def plan(configs, folder, jobs, as_json, **how) -> int:
     from compressor.sweep import add_times, cores, forecast
 
     studies = read_cases(configs, **how)
+    studies = [study.shard(*shard) for study in studies] if shard else studies
     machines = screen.caution(studies, None)
     screen.say_machines(machines)
     (found, missing), workers = forecast(studies, folder, FIRST), jobs or cores()

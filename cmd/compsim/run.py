@@ -18,16 +18,6 @@ if TYPE_CHECKING:
     from compressor.sweep import Summary
 
 
-def read_shard(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
-    """Return (I, N) of I/N with 1 <= I <= N. Raises BadParameter for other text."""
-    if text is None:
-        return None
-    number, of = text.partition("/")[::2]
-    if not (number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of)):
-        raise click.BadParameter(f"{text!r} is no I/N with 1 <= I <= N, such as 2/8")
-    return int(number), int(of)
-
-
 @click.command()
 @options.configs
 @options.results
@@ -36,9 +26,7 @@ def read_shard(_: click.Context, __: click.Parameter, text: str | None) -> tuple
 @options.only
 @options.max_jobs
 @click.option("--rerun", type=click.Choice(["failed"]), help="Run stored jobs that failed again.")
-@click.option(
-    "--shard", metavar="I/N", callback=read_shard, help="Run part I of N; others run the rest."
-)
+@options.shard
 @click.option(
     "--scheduler",
     type=options.TEXT,

@@ -5,7 +5,8 @@
 They select jobs (`--only`, `exclude`), and say under which condition a case reads a key. Python's
 parser reads a text into a tree; only comparisons may be in it, and nothing is ever run. Values mean
 what they mean in a case file: `true` is a boolean and `none` a word. Numbers are compared by size,
-words only with `==` and `!=`. A key that has no value differs from every value.
+words only with `==` and `!=`; a number of six digits or more equals what is rounded to it, as the
+program prints values. A key that has no value differs from every value.
 """
 
 import ast
@@ -29,6 +30,7 @@ SIGNS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
     ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le,
     ast.Gt: operator.gt, ast.GtE: operator.ge,
 }  # fmt: skip
+ROUNDED_DIGITS = 6  # of a number that may be a job's as the program prints it, rounded
 SUCH_AS = "write such as clearance_mm > 0.2 and load == gas"
 
 Value = Callable[[str], Any]  # a key -> a job's value, or None
@@ -121,7 +123,15 @@ def _compare_job(key: str, sign: Any, text: str) -> Test:
         raise NoComparison(f"{key} needs {'a number' if row.is_number else row.needed}, not {text}")
     if isinstance(wanted, str) and sign not in (operator.eq, operator.ne):
         raise NoComparison(f"{wanted} is a word: compare it by == or !=")
+    digits = len(re.sub(r"e.*|^[-+]?[0.]*|[.]", "", text.lower()))
+    if sign in (operator.eq, operator.ne) and row.is_number and digits >= ROUNDED_DIGITS:
+        return lambda value: bool(sign(round_number(value(key), digits), wanted))
     return _compare(lambda value: value(key), sign, wanted)
+
+
+def round_number(value: Any, digits: int) -> Any:
+    """Return a number in so many digits, as it may be printed; a word, or no value, as it is."""
+    return float(f"{value:.{digits}g}") if isinstance(value, int | float) else value
 
 
 def _compare(get: Callable[[Any], Any], sign: Any, wanted: Any) -> Callable[[Any], bool]:

@@ -7,7 +7,7 @@ whole, for its key and for what is wrong with its values, and again when it is u
 
 import itertools
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import partial
@@ -46,6 +46,7 @@ MAX_CONFLICTS = 20  # reported of one file; a sweep can have another in every jo
 IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
 WHOLE_FILE = ("name", "blocks", "report")
 AT_TOP = "needs keys at the top, such as `joint: big_end`, with a space after the colon"
+IDLE = "leaves out no job: compare with the values that compsim plan lists, or leave it out"
 NO_BLOCKS = "needs a list of mappings, such as [{load: none}, {joint: both}]"
 NO_CHANGES, NOWHERE = Tree({}, {}), Place("")
 NO_DRAWS = "samples nothing: give a key {random: [least, greatest]}, lhs, sobol or saltelli"
@@ -189,6 +190,8 @@ def _study(
     columns = [*blocks[0].columns] if is_grid else _columns(blocks)
     swept = [] if is_grid else columns
     keys, values, selected = _check_cases(file, cases, swept, only, progress)
+    if not file.changes.values and (idle := [*_find_idle_exclusions(blocks)]):
+        raise CaseFileError(idle)  # what the command line sets may have taken what they leave out
     sampled = next((block.tree for block in blocks if "sample" in block.tree.values), None)
     if sampled and file.tree and not any(map(draws, blocks)):
         alone = _block_trees(file.tree, NO_CHANGES, max_jobs)[0]  # of which --set may leave nothing
@@ -242,6 +245,17 @@ def _blocks(file: CaseFile, max_jobs: int) -> list[Block]:
     told |= {one.key for one in problems}  # from which more may follow
     left = [one for one in found.values() if not any(covers(one.key, key) for key in told)]
     raise CaseFileError(problems + left)
+
+
+def _find_idle_exclusions(blocks: Sequence[Block]) -> Iterator[Problem]:
+    """Yield the conditions of `exclude` that leave out no job of any block they are for."""
+    idle: dict[Place, bool] = {}
+    for block in blocks:
+        for number in range(len(block.exclusions)):
+            place = block.tree.at("exclude", number)[1]
+            idle[place] = idle.get(place, True) and number in block.left_and_idle[1]
+    for place in (place for place, is_idle in idle.items() if is_idle):
+        yield Problem("exclude", IDLE, place)
 
 
 def _block_trees(tree: Tree, changes: Tree, max_jobs: int) -> tuple[list[Tree], list[Problem]]:

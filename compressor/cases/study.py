@@ -110,14 +110,25 @@ class Block:
             for card in self.columns.get(key, [self.given[key]]):
                 self.mark(key, card)
 
-    @cached_property
+    @property
     def numbers(self) -> Sequence[int]:
         """Return the numbers of the combinations that are not excluded, in C order."""
+        return self.left_and_idle[0]
+
+    @cached_property
+    def left_and_idle(self) -> tuple[Sequence[int], set[int]]:
+        """Return `numbers`, and which of the exclusions leave nothing out."""
         every = range(math.prod(len(self.columns[keys[0]]) for keys in self.factors))
-        if not self.exclusions:
-            return every
-        jobs = ((n, reader(self.given_of(n), cache(partial(self._case_if_any, n)))) for n in every)
-        return [number for number, job in jobs if not any(test(job) for test in self.exclusions)]
+        idle = {*range(len(self.exclusions))}
+        if not idle:
+            return every, idle
+        left = []
+        for number in every:
+            job = reader(self.given_of(number), cache(partial(self._case_if_any, number)))
+            holding = {n for n, test in enumerate(self.exclusions) if test(job)}
+            idle -= holding
+            left += [] if holding else [number]
+        return left, idle
 
     def rows_of(self, number: int) -> dict[str, int]:
         """Return which of its values each swept key has in one combination."""

@@ -74,7 +74,8 @@ def test_failed_jobs_are_listed_with_what_to_do(quiet, case_file, compsim):
 def test_only_selected_jobs_run_and_the_study_stays_whole(case_file, compsim):
     case_file("two.yaml", load=["none", "spring"])
     case_file("one.yaml", load="gas")
-    out, err = compsim("run", "two.yaml", "one.yaml", "-j", "1", "--only", "load == none")
+    both = ["--only", "load == none", "--only", "load != gas"]  # of which all must hold
+    out, err = compsim("run", "two.yaml", "one.yaml", "-j", "1", *both)
     assert [line.split()[1:6:2] for line in out.splitlines()] == [["1", "1", "0"], ["0", "0", "0"]]
     assert err.startswith("--only selects 1 of 3 jobs\n")
     found = store.open_study("results", "two")
@@ -119,8 +120,10 @@ def test_shards_of_several_machines_are_one_store_when_they_are_copied(case_file
     case_file("one.yaml", load="none", machine={"rod_mass_kg": 5})
     both, ran = ["two.yaml", "one.yaml", "-j", "1"], 0
     for number in (1, 2, 3):
-        words = ["--shard", f"{number}/3", "-r", f"part-{number}", "--quiet"]
-        assert compsim("run", *both, *words).err == ""  # as all is well
+        words = ["--shard", f"{number}/3", "-r", f"part-{number}"]
+        ahead = json.loads(compsim("plan", *both, *words, "--json").out)["missing"]
+        assert compsim("run", *both, *words, "--quiet").err == ""  # as all is well
+        assert len(store.read_store(f"part-{number}")) == ahead
         ran += len(store.read_store(f"part-{number}"))
         shutil.copytree(f"part-{number}", "results", dirs_exist_ok=True)
     assert ran == 6  # no job is in two parts
