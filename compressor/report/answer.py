@@ -237,9 +237,10 @@ def rank_findings(
     """Return the findings of measures over jobs, the greatest change first, one a metric.
 
     worn: joints whose contact force is meant; where there is none, that of any. ascending: of
-    `ascending_jobs`. Knock comes first.
+    `ascending_jobs`. Knock comes first, and has a word on the other joint, too.
     """
     best: dict[str, MetricChange] = {}
+    knocks: dict[str, MetricChange] = {}
     for measure, values, bars in rows:
         if BARRED[measure.variable].counted or measure.variable in LEFT_OUT:
             continue
@@ -247,9 +248,14 @@ def rank_findings(
             continue
         found = finding(measure, values, bars, names)
         if found and measure.variable == KNOCK:
-            found = judge_knock(found, values, bars, names, ascending)
+            knocks[measure.joint] = found = judge_knock(found, values, bars, names, ascending)
         if found and (measure.variable not in best or found.rank > best[measure.variable].rank):
             best[measure.variable] = found
+    hardest = best.get(KNOCK)
+    for joint, other in knocks.items():
+        if hardest and other is not hardest:
+            words = f"{hardest.change}; {joint.replace('_', ' ')}: {other.change}"
+            best[KNOCK] = replace(hardest, change=words)
     return choose_findings(sorted(best.values(), key=lambda found: -found.rank), MAX_FINDINGS)
 
 
