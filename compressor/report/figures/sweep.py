@@ -183,9 +183,15 @@ def spell_correlated(sweep: PlottedSweep) -> str:
 def split_measures(
     sweep: PlottedSweep, known: Sequence[Measure]
 ) -> tuple[list[Measure], list[Measure]]:
-    """Return the measures that differ between jobs, or that some lack, and the others."""
+    """Return the measures that differ between jobs, or that some lack, and the others.
+
+    Where none differs those that are not 0. What is 0 wherever it is known is one of the others.
+    """
     values, is_ok = [measure.of(sweep.data) for measure in known], sweep.status == "ok"
-    varied = [bool(np.isnan(v[is_ok]).any() or np.ptp(v[np.isfinite(v)])) for v in values]
+    filled = [np.where(is_ok, np.nan_to_num(v), np.nanmax(v)) for v in values]  # lacks differ, too
+    varied = [bool(np.ptp(v)) for v in filled]
+    if not any(varied):
+        varied = [bool(v.any()) for v in filled]
     both = [*zip(known, varied, strict=True)]
     return [m for m, varies in both if varies], [m for m, varies in both if not varies]
 
@@ -201,8 +207,10 @@ def count_jobs(sweep: PlottedSweep) -> Iterator[Number]:
 
 def number_of_all(sweep: PlottedSweep, measure: Measure) -> Number:
     """Return the number of a measure that is the same at every job."""
-    value = f"{shown_value(np.nanmax(measure.of(sweep.data)))} {measure.unit}".rstrip()
-    return f"{measure.title}, at every job", value
+    values = measure.of(sweep.data)
+    lacks = " that has it" * bool(np.isnan(values[sweep.status == "ok"]).any())
+    text = f"{shown_value(np.nanmax(values))} {measure.unit}".rstrip()
+    return f"{measure.title}, at every job{lacks}", text
 
 
 def count_drawn(axis: PlottedAxis, most: int) -> list[Number]:

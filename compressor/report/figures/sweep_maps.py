@@ -77,12 +77,11 @@ def plot_map(
 ) -> None:
     """Draw a measure's cells with their colour scale, on which noise is no pattern."""
     panel.x.showgrid = panel.y.showgrid = False
-    low, high = float(np.nanmin(table)), float(np.nanmax(table))
-    is_log = spans_decades(table)
-    room = 0.0 if is_log else max(0.0, sweep_panels.least_room(table[np.isfinite(table)], bars))
+    values, is_log = table[np.isfinite(table)], spans_decades(table)
+    ends = (values.min(), values.max()) if is_log else sweep_panels.span_around(values, bars)
     panel.map(
-        *cells.centres, table, style.palette(COLORS), (low - room, high + room), "{}", measure.unit,
-        is_log, measure.title, sweep_panels.job_keys(cells.keys),
+        *cells.centres, table, style.palette(COLORS), ends, "{}", measure.unit, is_log,
+        measure.title, sweep_panels.job_keys(cells.keys),
     )  # fmt: skip
 
 

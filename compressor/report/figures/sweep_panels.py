@@ -117,33 +117,37 @@ def in_lines(words: Sequence[str]) -> list[str]:
     return [word.replace(" ", "\n") for word in words]
 
 
-def least_room(values: np.ndarray, bars: ArrayLike) -> float:
-    """Return how far an axis, or a scale of colours, goes beyond values at least, on either side.
+def span_around(values: np.ndarray, bars: ArrayLike, margin: float = 0.0) -> tuple[float, float]:
+    """Return the ends of an axis, or of a scale of colours, around finite values.
 
-    So that it spans MIN_BARS error bars and MIN_SHARE of the values: below 0 where these differ by
-    more. values: finite.
+    With a margin, in heights of the values. At least MIN_BARS error bars apart, and MIN_SHARE of
+    the values, which then stand in the middle; but below values that are not below 0, such as
+    counts, only the margin is.
     """
     bars = np.asarray(bars)
     bar = float(np.median(bars[np.isfinite(bars)])) if np.isfinite(bars).any() else 0.0
-    least = max(MIN_SHARE * abs(values).max(initial=0.0), MIN_BARS * bar) or 1.0
-    return 0.5 * (least - float(np.ptp(values))) if values.size else 0.0
+    low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
+    least = max(MIN_SHARE * max(abs(low), abs(high)), MIN_BARS * bar) or 1.0
+    whole = max((1.0 + 2.0 * margin) * (high - low), least)
+    start = 0.5 * (low + high - whole)
+    start = max(start, -margin / (1.0 + 2.0 * margin) * whole) if low >= 0.0 else start
+    return start, start + whole
 
 
 def scale_y(panel: Panel, values: np.ndarray, bars: ArrayLike = ()) -> float:
     """Set the y axis for values, with room at the foot for marks; return the panel's span.
 
-    Logarithmic over decades. Values that differ by less than `least_room` tells stand in its
-    middle.
+    Logarithmic over decades, else as `span_around`.
     """
     values = values[np.isfinite(values)]
-    low, high = (values.min(), values.max()) if values.size else (0.0, 1.0)
     if spans_decades(values):
+        low, high = values.min(), values.max()
         panel.y.type, room = "log", (high / low) ** PANEL_MARGIN
         panel.span("y", low / room, high * room)
         return float(low)
-    room = max(PANEL_MARGIN * (high - low), least_room(values, bars))
-    panel.span("y", low - room, high + room)
-    return float(high - low + 2.0 * room)
+    low, high = span_around(values, bars, PANEL_MARGIN)
+    panel.span("y", low, high)
+    return high - low
 
 
 def lines_for(axis: PlottedAxis, is_points: bool) -> dict[int, style.LineStyle]:
