@@ -29,7 +29,7 @@ from compressor.metrics import NUMBERS, SIZES
 from compressor.outcome import ROW, Outcome
 from compressor.physics._jit import ENABLED
 from compressor.solve.simulate import simulate
-from compressor.store.batch import write_batch
+from compressor.store.batch import encode_batch, make_batches, publish_batch
 from compressor.store.stored import read_store
 from compressor.store.studies import read_studies, write_study
 from compressor.sweep.warm_up import Part, compile_once
@@ -181,6 +181,12 @@ def outcome_of(dataset):
     }
     output = Case.from_attribute(dataset.attrs["case"]).output
     return found.with_series(series, output.precision, output.compress)
+
+
+def write_batch(folder, outcomes):
+    """Store outcomes as a batch, in a folder that is made; return its path."""
+    make_batches(folder)
+    return publish_batch(folder, encode_batch(outcomes))
 
 
 def keep(folder, *datasets):

@@ -69,6 +69,10 @@ class ProgressReporter:
         if self.logged_done not in (-1, self.done):
             screen.say(self.words())
         if error and self.folder and self.total:
+            from compressor.store import FolderLost
+
+            if isinstance(error, FolderLost):
+                return
             total = plural(self.total, self.things.removesuffix("s"))
             # at least: a worker may just have stored more
             stored = f"at least {self.done} of {total} {'is' if self.total == 1 else 'are'} stored"

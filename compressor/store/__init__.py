@@ -1,11 +1,12 @@
 """Outcomes on disk, and back."""
 
-from compressor.store.batch import encode_batch, publish_batch, write_batch
+from compressor.store.batch import encode_batch, make_batches, publish_batch
 from compressor.store.caveats import CLIPPED, run_caveats, study_caveats
 from compressor.store.demands import serving_both
 from compressor.store.export import export
 from compressor.store.files import (
     Folder,
+    FolderLost,
     StoreError,
     StoreWarning,
     publish,

@@ -31,7 +31,7 @@ import numpy as np
 
 from compressor.metrics import AXES, HORIZON, JOINTS, NUMBERS, QUANTILES, SEGMENTS, THRESHOLDS
 from compressor.outcome import ABSCISSAE, JOB_WORDS, ROW, Outcome, Variable, coordinates
-from compressor.store.files import Folder, publish
+from compressor.store.files import Folder, FolderLost, StoreError, make_folder, publish
 from compressor.store.netcdf import (
     dimensions_of,
     encode_netcdf,
@@ -168,24 +168,26 @@ def _join_series(outcomes: Sequence[Outcome]) -> dict[str, Variable]:
     return found
 
 
+def make_batches(folder: Folder) -> None:
+    """Make the folder of batches, once, when a run begins. Raises StoreError."""
+    make_folder(Path(folder) / FOLDER)
+
+
 def publish_batch(folder: Folder, data: bytes, written: str = "") -> Path:
     """Write the bytes of a batch under a new name, durably; return its path.
 
-    folder: of results; written: the time that its name begins with, by default now. Raises
-    StoreError where the disk refuses.
+    folder: of results, which `make_batches` has made; written: the time that its name begins with,
+    by default now. Raises StoreError where the disk refuses, FolderLost where the folder is gone.
     """
     name = f"{written or f'{time.time_ns():020}'}-{uuid.uuid4().hex[:8]}{SUFFIX}"
     path = Path(folder) / FOLDER / name
-    publish(path, data)
+    try:
+        publish(path, data, make=False)  # one made anew would lack what the run has stored before
+    except StoreError as error:
+        if isinstance(error.__cause__, FileNotFoundError | NotADirectoryError):
+            raise FolderLost(folder, FolderLost.PROBLEM, FolderLost.REMEDY) from error
+        raise
     return path
-
-
-def write_batch(folder: Folder, outcomes: Sequence[Outcome]) -> Path:
-    """Write outcomes, with the time series that are in them, as a batch; return its path.
-
-    folder: of results. Raises StoreError where the disk refuses.
-    """
-    return publish_batch(folder, encode_batch(outcomes))
 
 
 # ---- reading: each raises DamagedFile, and FileNotFoundError ------------------------------------

@@ -65,6 +65,13 @@ class WrongName(StoreError):
     exit_code = 2
 
 
+class FolderLost(StoreError):
+    """A folder of results that was removed or replaced while a run wrote to it."""
+
+    PROBLEM = "was removed or replaced, at least in part, while the run wrote to it"
+    REMEDY = "run the same command again, in a folder that stays"
+
+
 class StoreWarning(CompsimWarning):
     """What a store lacks that was requested, such as a damaged file; its reader goes on without.
 
@@ -92,14 +99,15 @@ def refusals(path: Path, named: bool = True) -> Iterator[None]:
         raise system_error(other, error) from error
 
 
-def publish(path: Path, data: bytes, durable: bool = True) -> None:
+def publish(path: Path, data: bytes, durable: bool = True, make: bool = True) -> None:
     """Write a whole file under its name, or leave what was there.
 
-    durable: a power cut leaves it there, too, which takes the disk a while. Raises StoreError where
-    the disk refuses.
+    durable: a power cut leaves it there, too, which takes the disk a while. make: also its folder.
+    Raises StoreError where the disk refuses.
     """
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
-    make_folder(path.parent)
+    if make:
+        make_folder(path.parent)
     with refusals(path, named=False):
         try:
             with open(temporary, "wb") as file:

@@ -19,8 +19,8 @@ MAX_SMALL = 8  # small batches that may stay
 Counting = tuple[Path, list[int], float]  # a batch, its rows that count, its part of a merged one
 
 
-def merge_batches(folder: Folder) -> None:
-    """Merge the small batches of a folder, of this run or another, if there are many.
+def merge_batches(folder: Folder) -> set[str]:
+    """Merge the small batches of a folder, if there are many; return the keys of all jobs in it.
 
     A merged one is on disk before those that it replaces are removed. It has the rows that count,
     and is as old as the newest of them: what is written meanwhile counts as the later. Batches that
@@ -46,6 +46,7 @@ def merge_batches(folder: Folder) -> None:
         if sum(map(len, small.values())) > MAX_SMALL:
             for alike in small.values():
                 _merge_alike(folder, alike)
+        return stored.keys()
 
 
 def set_aside(path: Path) -> None:

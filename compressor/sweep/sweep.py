@@ -14,7 +14,16 @@ from typing import Any
 from compressor.cases import Case, Study, points
 from compressor.outcome import Outcome, without_run
 from compressor.program import Progress, ignore_warnings, no_progress
-from compressor.store import Folder, merge_batches, read_store, write_batch, write_study
+from compressor.store import (
+    Folder,
+    FolderLost,
+    encode_batch,
+    make_batches,
+    merge_batches,
+    publish_batch,
+    read_store,
+    write_study,
+)
 from compressor.sweep.pool import Input, Workers, cores, require_posix, run_batches
 from compressor.sweep.wanted import JobEnd, RequestedJobs
 from compressor.sweep.warm_up import Part, compile_once, load, needed_parts
@@ -92,6 +101,7 @@ def sweep(
     if options.rerun_failed:
         ends = {key: end for key, end in ends.items() if end.status == "ok"}
     missing = wanted.among(wanted.places.keys() - ends.keys())
+    make_batches(folder)
     for study in studies:
         write_study(folder, study, options.command, options.overrides)
     if missing:
@@ -99,7 +109,10 @@ def sweep(
             progress(len(ends), len(wanted), f"{damage}: its jobs count as missing")
         run_missing(folder, missing, ends, workers, progress, options)
     if missing or stored.damaged:
-        merge_batches(folder)
+        held = merge_batches(folder)
+        files = (folder / "studies" / f"{study.name}.json" for study in studies)
+        if not (ends.keys() <= held and all(file.exists() for file in files)):
+            raise FolderLost(folder, FolderLost.PROBLEM, FolderLost.REMEDY)
     counts = {study.name: len(study.selected) for study in studies}
     failures, seconds = list_failures(studies, ends), time.monotonic() - began
     return Summary(len(wanted) - len(missing), len(missing), counts, failures, seconds)
@@ -162,7 +175,7 @@ def run_job(case: Case) -> Outcome:
 
 def store_outcomes(folder: Path, outcomes: Sequence[Outcome]) -> list[JobEnd]:
     """Store the outcomes of a batch of jobs; return how each ended. Raises StoreError."""
-    write_batch(folder, outcomes)
+    publish_batch(folder, encode_batch(outcomes))
     return [JobEnd.of(outcome) for outcome in outcomes]
 
 

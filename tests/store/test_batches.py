@@ -5,11 +5,11 @@ import shutil
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import flip
+from conftest import flip, write_batch
 from made_jobs import batches, forget, held, key, made, peaks, plan
 
 from compressor.store import batch, merge, reader
-from compressor.store.batch import read_batch, read_outcomes, write_batch
+from compressor.store.batch import read_batch, read_outcomes
 from compressor.store.files import StoreError
 from compressor.store.merge import merge_batches
 from compressor.store.reader import open_study, read_store

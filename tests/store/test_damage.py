@@ -8,11 +8,10 @@ import uuid
 
 import pytest
 import xarray as xr
-from conftest import flip
+from conftest import flip, write_batch
 from made_jobs import batches, held, key, made, plan
 
 from compressor.program import PROGRAM
-from compressor.store.batch import write_batch
 from compressor.store.files import StoreError, StoreWarning, discard_leftovers, publish
 from compressor.store.netcdf import DamagedFile, read_dataset, write_dataset
 from compressor.store.reader import open_study, read_store

@@ -6,12 +6,12 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import SHORT, WORN_SENSOR, assert_same_bits, keep
+from conftest import SHORT, WORN_SENSOR, assert_same_bits, keep, write_batch
 from made_jobs import batches, held, key, made
 
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
-from compressor.store.batch import read_outcomes, write_batch
+from compressor.store.batch import read_outcomes
 from compressor.store.files import StoreError
 from compressor.store.reader import read_job, read_store
 

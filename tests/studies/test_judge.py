@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import store_cases
+from conftest import store_cases, write_batch
 
 from compressor.cases.case import Case
 from compressor.solve.simulate import observe
-from compressor.store import find_study, write_batch
+from compressor.store import find_study
 from compressor.studies import judge as judging
 
 SOLVE = {"duration_rev": 0.5, "settle_rev": 0, "output_step_deg": 1, "rtol": 1e-6}

@@ -111,6 +111,7 @@ def test_a_result_that_is_felled_with_its_worker_is_made_alone(studies, tmp_path
     ready = MagicMock(add=(there := []).append)
     ready.__next__.side_effect = lambda: there.pop(0)
     monkeypatch.setattr(distributed, "as_completed", lambda loop: ready)
+    (tmp_path / "batches").mkdir()
     jobs = RequestedJobs(studies[1:])
     ends = [*cluster.run_on_cluster(client, "an address", tmp_path, jobs, str)]
     assert {end.id: end.reason for end in ends} == dict.fromkeys(jobs.places, "")

@@ -14,7 +14,8 @@ from conftest import flip
 from compressor.cases.case import Case
 from compressor.store import netcdf
 from compressor.store import reader as store
-from compressor.store.files import StoreError
+from compressor.store.batch import make_batches
+from compressor.store.files import FolderLost, StoreError
 from compressor.store.status import verify
 from compressor.sweep.sweep import sweep
 from compressor.sweep.wanted import RequestedJobs
@@ -153,6 +154,19 @@ def test_a_job_that_cannot_be_stored_ends_the_sweep(studies, tmp_path, in_proces
     (tmp_path / "out/batches").symlink_to("nowhere")
     with pytest.raises(StoreError, match=r"out/batches: is a link that leads nowhere"):
         sweep(studies(one={"load": ["none", "spring"]}), tmp_path / "out", 2)
+
+
+@pytest.mark.parametrize("lost", ["", "studies/one.json", "batches"])
+def test_a_folder_that_is_lost_amid_a_run_is_an_error(lost, studies, tmp_path, in_process):
+    def clean(done, total, remark):
+        if done == 1:
+            (tmp_path / "out" / lost).rename(tmp_path / "lost")
+            if lost == "batches":  # as another run may
+                make_batches(tmp_path / "out")
+
+    with pytest.raises(FolderLost, match=r"out: was removed or replaced.*again, in a folder that"):
+        sweep(studies(one={"load": ["none", "spring"]}), tmp_path / "out", 1, clean)
+    assert (tmp_path / "out" / lost).exists() == (lost == "batches")  # not made anew
 
 
 def test_what_a_killed_worker_stored_and_did_not_tell_of_stays(studies, tmp_path, monkeypatch):

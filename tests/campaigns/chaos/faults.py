@@ -12,7 +12,7 @@ import shutil
 
 from chaos import common
 from compressor.store import merge
-from compressor.store.batch import read_outcomes, write_batch
+from compressor.store.batch import encode_batch, publish_batch, read_outcomes
 
 WHAT = "a disk that is full at any byte or file, or read-only"
 TMPFS = ("-t", "tmpfs")
@@ -59,7 +59,7 @@ def prepare(how, complete, store):
         os.utime(leftover, (0, 0))
         for path in others:
             for outcome in read_outcomes(path):
-                write_batch(store, [outcome])
+                publish_batch(store, encode_batch([outcome]))
 
 
 def say(words):
