@@ -1,9 +1,8 @@
 """Units that people read beside SI: of axes, tables, `show`, CSV headers, limits of searches.
 
 Files and Python have SI. Two choices are offered: `si`, and `plant` with mm, mm/s, g, kN, bar and
-rpm. Without a choice pages, figures and `show` have kN, mm, µm and m/s², CSV and `find` SI; so have
-sentences, each number with its unit, whatever the choice. Angles stay in degrees in figures; what
-is not listed stays as it is. Without libraries, as `digits`.
+rpm. Without a choice pages, figures and `show` have kN, mm, µm and m/s², CSV and `find` SI. Angles
+stay in degrees in figures; what is not listed stays as it is. Without libraries, as `digits`.
 """
 
 import math

@@ -39,7 +39,7 @@ def find_inputs(stored: Stored, study: StoredStudy) -> list[tuple[str, Lines]]:
     named |= {key.rpartition(".")[0] for key in named}
     given = {key: value for key, value in fixed.items() if key in named}
     assumed = {
-        key: spell_ends(key, value, cases)
+        key: spell_over_jobs(key, value, cases)
         for key, value in fixed.items()
         if key not in given and key.partition(".")[0] not in NOT_ASSUMED and reads(cases[0], key)
     }
@@ -69,7 +69,7 @@ def by_group(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [(group, "; ".join(words)) for group, words in found.items()]
 
 
-def spell_ends(key: str, value: Any, cases: Sequence[Case]) -> Any:
+def spell_over_jobs(key: str, value: Any, cases: Sequence[Case]) -> Any:
     """Return a value; where it follows from a swept one, the least and the greatest as text."""
     if not isinstance(value, int | float):
         return value

@@ -339,6 +339,7 @@ def test_a_sweep_is_drawn_over_the_crank_angle(tmp_path):
     assert title.format(places[3]) in text
     assert f"Greatest acceleration: {peaks[3]} m/s² (" in text
     assert "Of the study's jobs with series it has the greatest vibration." in text
+    assert "m/s²" not in written(own, tmp_path, units="plant").text  # nor in captions
     damage_series(own, study.keys[2])
     damage_series(own, study.keys[3])
     text = written(own, tmp_path).text

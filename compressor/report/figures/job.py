@@ -103,29 +103,30 @@ def draw_analyst(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
         f"The last settled revolution: {vibration.title}, every {spell_step(found.angle)}, and rod "
         f"load below, every {spell_step(found.load_angle)}; peaks are of these samples."
     )
-    numbers = number_analyst(found, word)
+    numbers = number_analyst(found, word, units)
     vibrates = "sensor_peak" if found.is_sensed else "peak_acceleration"
-    numbers += number_metrics(run, vibrates, *ROD_LOADS)
+    numbers += number_metrics(run, units, vibrates, *ROD_LOADS)
     if twin is not None:
         peak, _ = loudest(analysis.read_cycle(twin))
-        numbers.insert(2, ("greatest without clearance", spell(peak, "m/s²")))
+        numbers.insert(2, ("greatest without clearance", spell(peak, "m/s²", units)))
     clipped = float(run.get("clipped_fraction", 0.0))
     if clipped >= Sensor.REPORTED:
         numbers.append(("record", CLIPPED.format(share=f"{100.0 * clipped:.3g}")))
     return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)
 
 
-def number_analyst(found: analysis.Cycle, contact: str) -> list[Number]:
+def number_analyst(found: analysis.Cycle, contact: str, units: Units) -> list[Number]:
     """Return the numbers of a revolution; contact: what begins, in words."""
     peak, at = loudest(found)
+    also = f" ({spell(G * peak, 'g')})" * (units != "plant")
     rms = float(np.sqrt(np.mean(found.vibration**2)))
     events = ", ".join(f"{name} at {angle:.0f}°" for angle, name in found.events)
     struck = [(f"{contact} at the {analysis.SPOKEN[joint]}", spell_turns(at))
               for joint, at in found.struck.items()]  # fmt: skip
     return [
-        ("greatest acceleration", f"{spell(peak, 'm/s²')} ({spell(G * peak, 'g')}) at {at:.0f}°"),
-        ("rms", spell(rms, "m/s²")),
-        ("rod load", spell_span(found.rod_load * curves.KILONEWTON, "kN")),
+        ("greatest acceleration", f"{spell(peak, 'm/s²', units)}{also} at {at:.0f}°"),
+        ("rms", spell(rms, "m/s²", units)),
+        ("rod load", spell_span(found.rod_load * curves.KILONEWTON, "kN", units)),
         ("it changes its side at", spell_turns(found.reversals)),
         *([("events", events)] if events else []),
         *struck,
@@ -137,9 +138,11 @@ def spell_step(angle: np.ndarray) -> str:
     return f"{np.median(np.diff(angle)):.3g}°"
 
 
-def number_metrics(run: xr.Dataset, *names: str) -> list[Number]:
+def number_metrics(run: xr.Dataset, units: Units, *names: str) -> list[Number]:
     """Return the job's metrics of some names, which no sampling or single revolution lessens."""
-    shown = [one for one in MEASURES if one.variable in names and one.variable in run]
+    shown = [
+        one.read_in(units) for one in MEASURES if one.variable in names and one.variable in run
+    ]
     texts = [f"{one.title} {spell(one.of(run), one.unit)}" for one in shown
              if np.isfinite(one.of(run))]  # fmt: skip
     return [("over all settled revolutions", ", ".join(texts))] * bool(texts)
@@ -214,10 +217,10 @@ def draw_signals(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
         for panel, signal in zip(panels.flat, SIGNALS, strict=True):
             values = series[signal.name] * (curves.KILONEWTON if signal.unit == "kN" else 1.0)
             panel.plot(degrees, values, line, NAMES[name])
-            numbers.append((f"{signal.title}{where}", spell_span(values, signal.unit)))
+            numbers.append((f"{signal.title}{where}", spell_span(values, signal.unit, units)))
         panels[0, 0].span("x", degrees[0], degrees[-1])
     panels[0, 0].x.dtick = 90.0
-    numbers += number_metrics(run, "peak_acceleration", *ROD_LOADS)
+    numbers += number_metrics(run, units, "peak_acceleration", *ROD_LOADS)
     sentence = (
         "The last settled revolution over crank angle, at stored samples, every "
         f"{spell_step(analysis.last_revolution(run)[0])}; peaks are of these."
@@ -322,7 +325,7 @@ def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
         if one is not None:
             found = analysis.shaking(one)
             plot_lines(panel, found.amplitudes, line, NAMES[name])
-            numbers.append((label, spell(found.above, "N")))
+            numbers.append((label, spell(found.above, "N", units)))
     panel.x.title = ORDERS_AXIS
     step = spell_step(analysis.last_revolution(run)[0])
     sentence = (
@@ -361,7 +364,7 @@ def draw_orbits(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFig
         off = spell(100.0 * (depth < 0).mean(), "% of the time")
         numbers += [
             (f"{analysis.SPOKEN[joint]}, off its wall", off),
-            ("deepest, below 0 a gap", spell(MICROMETRE * depth.max(), "µm")),
+            ("deepest, below 0 a gap", spell(MICROMETRE * depth.max(), "µm", units)),
         ]
     sentence = "Journal centres in their bores to scale, in the last settled revolution."
     return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)

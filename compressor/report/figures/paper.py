@@ -90,7 +90,7 @@ def draw_fault_response(runs: curves.Runs, fault: str, units: Units = "usual") -
     )
     worn = [runs[analysis.label(fault, c)] for c in analysis.CLEARANCES]
     away = 100.0 * np.max([differences_from_ideal(run) for run in worn], axis=0)
-    peaks = spell([run["peak_acceleration"] for run in worn], "m/s²")
+    peaks = spell([run["peak_acceleration"] for run in worn], "m/s²", units)
     numbers = [
         (f"greatest difference of {WORDS} from no clearance", f"{spell(away)} % of the range"),
         (f"greatest acceleration at {AT}", peaks),
@@ -150,7 +150,7 @@ def draw_piston_force(runs: curves.Runs, units: Units = "usual") -> DrawnFigure:
     numbers = []
     for load, name in (("design", "spring"), ("typical", "gas")):
         peak = float(runs[load]["piston_force"].max()) * curves.KILONEWTON
-        numbers.append((f"greatest force of the {name}", spell(peak, "kN")))
+        numbers.append((f"greatest force of the {name}", spell(peak, "kN", units)))
         numbers.append(
             (f"corners of the {name}", spell_angles(analysis.record_of(runs[load]).corners))
         )
@@ -198,7 +198,7 @@ def draw_contact_force(
     for axis, words in (("x", "along the cylinder"), ("y", "across it")):
         worn = [runs[analysis.label(fault, c)] for c in analysis.CLEARANCES]
         peaks = [run["peak_contact_force_axis"].sel(joint=joint, axis=axis) for run in worn]
-        values = spell(np.array(peaks) * curves.KILONEWTON, "kN")
+        values = spell(np.array(peaks) * curves.KILONEWTON, "kN", units)
         numbers.append((f"greatest {words} at {AT}", values))
     return DrawnFigure(finish_figure(drawing, [panels[-1, 0], enlarged]), sentence, numbers)
 
@@ -234,7 +234,7 @@ def draw_relation(runs: curves.Runs, joint: str, units: Units = "usual") -> Draw
     )
     numbers = [
         (f"slope at {AT}", spell([one.slope for one in found], "kg")),
-        ("force without acceleration", spell([1e-3 * one.intercept for one in found], "kN")),
+        ("force without acceleration", spell([1e-3 * one.intercept for one in found], "kN", units)),
         ("r²", spell([one.r2 for one in found])),
     ]
     return DrawnFigure(drawing.figure(), sentence, numbers)
@@ -304,8 +304,8 @@ def draw_cam(runs: curves.Runs, units: Units = "usual") -> DrawnFigure:
     )
     rise, fall = cam.printed_heights
     numbers = [
-        ("as printed it rises and falls by", spell([1e3 * rise, 1e3 * fall], "mm")),
-        ("the closed cam, each way, by", spell(1e3 * cam.height, "mm")),
+        ("as printed it rises and falls by", spell([1e3 * rise, 1e3 * fall], "mm", units)),
+        ("the closed cam, each way, by", spell(1e3 * cam.height, "mm", units)),
         ("both are the same from", spell_angles(cam.gas_corners[2])),
     ]
     return DrawnFigure(drawing.figure(), sentence, numbers)

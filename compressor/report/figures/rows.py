@@ -108,7 +108,7 @@ def draw_cycles(rows: Sequence[SweptRow], title: str, units: Units = "usual") ->
               if one and peak == np.nanmax(loud))  # fmt: skip
     counts = [len(one.reversals) for one in found if one]
     numbers = [
-        *spell_ends("greatest magnitude", loud, rows, "m/s²"),
+        *spell_ends("greatest magnitude", loud, rows, "m/s²", units),
         ("the greatest comes at", f"{at:.0f}°, {spell(G * np.nanmax(loud), 'g')}"),
         ("changes of the rod load's side a revolution", ", ".join(map(str, sorted({*counts})))),
     ]
@@ -137,7 +137,7 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str, units: Units = "usual")
     above = np.array([one.above if one else np.nan for one in found])
     words = f"rms of X above<br>order {analysis.ORDER} ({{}})"
     figure = finish_map(drawing, above, words, "N", max(1.0, 1.08 * np.nanmax(above)))
-    numbers = spell_ends(f"rms of X above order {analysis.ORDER}", above, rows, "N")
+    numbers = spell_ends(f"rms of X above order {analysis.ORDER}", above, rows, "N", units)
     sentence = f"Order spectra of X, {describe_rows(rows, title)}.{left_out(rows)}"
     return DrawnFigure(figure, sentence, numbers)
 
@@ -150,12 +150,14 @@ def describe_rows(rows: Sequence[SweptRow], title: str) -> str:
     return f"a row for each value of {title}"
 
 
-def spell_ends(what: str, values: np.ndarray, rows: Sequence[SweptRow], unit: str) -> list[Number]:
+def spell_ends(
+    what: str, values: np.ndarray, rows: Sequence[SweptRow], unit: str, units: Units
+) -> list[Number]:
     """Return the least and the greatest of some rows' values, and where they are."""
     if np.nanmax(values) == np.nanmin(values):
-        return [(what, spell(np.nanmax(values), unit))]
+        return [(what, spell(np.nanmax(values), unit, units))]
     ends = (("least", np.nanargmin(values)), ("greatest", np.nanargmax(values)))
-    texts = [f"{word} {spell(values[n], unit)} at {rows[int(n)].value}" for word, n in ends]
+    texts = [f"{word} {spell(values[n], unit, units)} at {rows[int(n)].value}" for word, n in ends]
     return [(what, ", ".join(texts))]
 
 

@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike
 
 from compressor.report.figures.drawing import INCH
 from compressor.report.figures.pictures import DPI
+from compressor.units import Units, unit_in
 
 Kind = Literal["paper", "job", "study"]
-NOTHING = 1e-6  # in any unit of a figure: below it a number is rounding
+NOTHING = 1e-6  # in any of the usual units: below it a number is rounding
 Number = tuple[str, str]  # a label, and what is measured, with its unit
 
 
@@ -86,13 +87,18 @@ def figure(
     return enter
 
 
-def spell(values: ArrayLike, unit: str = "") -> str:
-    """Return numbers to four digits, one after the other, with their unit; rounding is 0."""
+def spell(values: ArrayLike, unit: str = "", units: Units = "usual") -> str:
+    """Return numbers to four digits, one after the other, with their unit; rounding is 0.
+
+    unit: of the values; units: that they are read in.
+    """
     known = np.atleast_1d(np.asarray(values, float))
-    known = np.where(abs(known) < NOTHING, 0.0, known)
+    unit, factor = unit_in(unit, units)
+    known = np.where(abs(known) < NOTHING, 0.0, factor * known)
     return f"{', '.join(f'{float(text):g}' for text in np.char.mod('%.4g', known))} {unit}".rstrip()
 
 
-def spell_span(values: np.ndarray, unit: str) -> str:
-    """Return the least and the greatest of some values, with their unit."""
-    return f"{spell(values.min())} to {spell(values.max())} {unit}"
+def spell_span(values: np.ndarray, unit: str, units: Units) -> str:
+    """Return the least and the greatest of some values, with their unit, as `spell`."""
+    _, factor = unit_in(unit, units)
+    return f"{spell(factor * values.min())} to {spell(values.max(), unit, units)}"
