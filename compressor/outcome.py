@@ -120,7 +120,7 @@ class Outcome:
 JOB_WORDS = {
     "status": "ok, failed or missing",
     "reason": "why a run failed",
-    "promise": "kept: the accuracy target was reached; none: there is no target",
+    "promise": "kept: the accuracy target was reached; none: no target, or a chaotic motion",
     "regime": "; ".join(map(regime_words, Regime)),
 }
 

@@ -5,7 +5,10 @@ import click
 from compressor.digits import align_columns, plural
 from compsim import options, screen
 
-PROMISES = {"kept": "reached their accuracy target", "none": "without an accuracy target"}
+PROMISES = {
+    "kept": "reached their accuracy target", "none": "without an accuracy target",
+    "chaotic": "chaotic (no accuracy target can hold)",
+}  # fmt: skip
 
 
 @click.command()

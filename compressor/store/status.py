@@ -17,6 +17,7 @@ import numpy as np
 
 from compressor.cases import Case, points
 from compressor.metrics import NUMBERS
+from compressor.outcome import Regime
 from compressor.store.batch import FOLDER as BATCHES
 from compressor.store.caveats import job_caveats, study_caveats
 from compressor.store.files import Folder, StoreError, refusals
@@ -110,8 +111,9 @@ class StudyProgress:
     """How many jobs of one study are done, failed or missing, and why.
 
     `reasons`: failed ones by reason; `promises`, `regimes`: those that are ok by what their
-    accuracy promises, and by how far they can be foretold, "" where that is not known; each with
-    the most frequent first. `caveats`: what to know beside the numbers, a sentence each.
+    accuracy promises, `chaotic` where it can promise nothing, and by how far they can be foretold,
+    "" where that is not known; each with the most frequent first. `caveats`: what to know beside
+    the numbers, a sentence each.
     """
 
     study: str
@@ -158,9 +160,11 @@ def standings(folder: Folder) -> list[StudyProgress]:
         is_ok = stored.columns["status"][positions] == b"ok"
         ok, failed = positions[is_ok], positions[~is_ok]
 
-        def counts(name: str, some: np.ndarray) -> dict[str, int]:
-            return dict(Counter(stored.words(name)[some].tolist()).most_common())
+        def counts(words: np.ndarray) -> dict[str, int]:
+            return dict(Counter(words.tolist()).most_common())
 
+        promises, regimes = stored.words("promise")[ok], stored.words("regime")[ok]
+        is_vain = (promises == "none") & (regimes == Regime.CHAOTIC)
         found.append(
             StudyProgress(
                 study.name,
@@ -168,9 +172,9 @@ def standings(folder: Folder) -> list[StudyProgress]:
                 ok.size,
                 failed.size,
                 study.jobs - positions.size,
-                counts("reason", failed),
-                counts("promise", ok),
-                counts("regime", ok),
+                counts(stored.words("reason")[failed]),
+                counts(np.where(is_vain, Regime.CHAOTIC, promises)),
+                counts(regimes),
                 study_caveats(stored, study),
                 study.again,
             )

@@ -42,14 +42,14 @@ def test_status_counts_jobs_reasons_promises_and_regimes(whole, compsim):
     (found,) = standings(whole)
     assert (found.jobs, found.ok, found.failed, found.missing) == (4, 2, 2, 0)
     assert found.reasons == {"budget_steps": 2}
-    assert found.promises == {"none": 1, "kept": 1}
+    assert found.promises == {"chaotic": 1, "kept": 1}
     assert found.regimes == {"chaotic": 1, "periodic": 1}
     out = compsim("status", "-r", whole).out
     assert max(map(len, out.splitlines())) <= 80
     out = " ".join(out.split())
     assert out.startswith("ring 4 jobs 2 ok 2 failed 0 missing")
     assert "2 budget_steps: raise solve.max_steps" in out
-    reached = "1 without an accuracy target, 1 reached their accuracy target"
+    reached = "1 chaotic (no accuracy target can hold), 1 reached their accuracy target"
     assert f"of those ok: {reached} of those ok" in out
     for regime in ("chaotic", "periodic"):
         assert f"of those ok: 1 {regime} ({REGIME_WORDS[Regime(regime)]})" in out
