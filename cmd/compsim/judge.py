@@ -26,9 +26,9 @@ def judge(study, folder, jobs, as_json, quiet) -> int:
     Runs each job that is ok again by another integrator at a hundredth of its tolerance; if that
     disagrees by a second one, and if these differ by a third. The majority counts. The verdict of a
     job is ok; silent_wrong, if a number is off by more than ten error bars and a thousand times the
-    tolerance (5 % at most); or unjudged. For a chaotic motion it compares averages. Prints counts
-    and the worst jobs; stores the runs in judge/ of the folder of results. The same command
-    continues what was interrupted.
+    tolerance (5 % at most); or unjudged, with the reason. For a chaotic motion it compares
+    averages. Prints counts and the worst jobs; stores the runs in judge/ of the folder of results.
+    The same command continues what was interrupted.
 
     Exit code 3 if a number is wrong without a warning.
     """
@@ -42,6 +42,6 @@ def judge(study, folder, jobs, as_json, quiet) -> int:
         screen.print_json(to_rows(found))
     else:
         worst = table(rank(found)[:WORST])
-        screen.print_text(summarize(found), "", *align_columns(worst, "<<<>>><"))
+        screen.print_text(*summarize(found), "", *align_columns(worst, "<<<>>><"))
     wrong = any(job.verdict == "silent_wrong" for job in found)
     return screen.SOME_FAILED if wrong else screen.DONE

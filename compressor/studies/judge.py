@@ -6,10 +6,10 @@ without contact 1e-4 at least. The judge is another integrator at a hundredth of
 below 1e-12. One that agrees settles a job; where it does not, or does not reach the end, a second
 one is run, and a third where two differ. The majority counts.
 
-Of a motion that the job itself calls chaotic only averages are foretold. They are judged at a tenth
-of the tolerance: rms values within 50 %, time without contact within a quarter of the span, or ten
-bars again. Impacts and releases are not counted alike: contact that grazes begins any number of
-times.
+Of a motion that the job itself calls chaotic only averages are foretold. They are judged over its
+own revolutions, at a tenth of the tolerance: rms values within 50 %, time without contact within a
+quarter of the span, or ten bars again. Impacts and releases are not counted alike: contact that
+grazes begins any number of times.
 
 What judges run are ordinary jobs, stored in RESULTS/judge; so the same command goes on.
 """
@@ -23,12 +23,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compressor import cases, store, sweep
+from compressor import cases, program, reasons, solve, store, sweep
 from compressor.cases import Case, Study
 from compressor.digits import plural
 from compressor.metrics import METRICS
-from compressor.program import Progress, no_progress
-from compressor.store import StoredStudy
 
 FOLDER = "judge"
 SILENT_FACTOR = 10.0  # times its bar: an error beyond it is silent
@@ -53,10 +51,14 @@ STIFF = 8.0  # evaluations a step: more are the stiff partner's
 SHORT = 2000  # steps
 # steps, so that a verdict does not depend on how fast a machine is; and seconds beyond all of them
 COMPILED_STEPS, SCIPY_STEPS, SECONDS = 2_500_000, 20_000, 300.0
+TOO_LONG = (
+    f"judges stop after {COMPILED_STEPS:,} steps, SciPy's after {SCIPY_STEPS:,}: judge a job of "
+    "fewer revolutions"
+)
 
 
 class Vote(NamedTuple):
-    """What one judge says of a job; nan where it did not reach its end.
+    """What one judge says of a job; nan where it did not reach its end, for `reason`.
 
     `ratio`: of the greatest error of a metric to the greatest that is no silent one; `error` and
     `bar` of that metric, relative.
@@ -67,13 +69,15 @@ class Vote(NamedTuple):
     metric: str = ""
     error: float = math.nan
     bar: float = math.nan
+    reason: str = ""
 
 
 @dataclass
 class JudgedJob:
     """A job of a study: its place, how it ended, and what judges say of it.
 
-    `point`: its swept values; `numbers`: metrics, error bars and steps.
+    `point`: its swept values; `settle`: s, from which its metrics count; `numbers`: metrics, error
+    bars, steps and revolutions.
     """
 
     key: str
@@ -83,6 +87,7 @@ class JudgedJob:
     regime: str
     case: Case | None
     rtol: float
+    settle: float
     numbers: Mapping[str, np.ndarray]
     votes: list[Vote]
 
@@ -95,6 +100,19 @@ class JudgedJob:
         if agreed == dissent:
             return "unjudged"
         return "ok" if agreed > dissent else "silent_wrong"
+
+    @property
+    def why(self) -> str:
+        """Return why the job failed, or why it is unjudged and what to do about it."""
+        if self.verdict != "unjudged":
+            return self.reason
+        if self.case is None:
+            return "its case is of another version of the program: run it again"
+        lost = [vote.reason for vote in self.votes if vote.reason]
+        if not lost:
+            return "judges disagree: try a finer solve.accuracy"
+        is_too_long = lost[0] in (reasons.Reason.BUDGET_STEPS, reasons.Reason.BUDGET_SECONDS)
+        return f"{lost[0]} of a judge: {TOO_LONG if is_too_long else reasons.remedy(lost[0])}"
 
     @property
     def is_open(self) -> bool:
@@ -122,8 +140,9 @@ class JudgedJob:
 
 
 def judge(
-    folder: store.Folder, name: str | None, workers: int, progress: Progress = no_progress
-) -> list[JudgedJob]:
+    folder: store.Folder, name: str | None, workers: int,
+    progress: program.Progress = program.no_progress,
+) -> list[JudgedJob]:  # fmt: skip
     """Return the jobs of a stored study with their verdicts; judges that are missing are run.
 
     name: of the study; None: the only one. Progress counts the runs of a judge. Raises StoreError
@@ -143,7 +162,7 @@ def judge(
     return jobs
 
 
-def read_jobs(folder: store.Folder, source: StoredStudy) -> list[JudgedJob]:
+def read_jobs(folder: store.Folder, source: store.StoredStudy) -> list[JudgedJob]:
     """Return the jobs of a study, each once."""
     stored = store.read_store(folder)
     own = dict(zip(source.keys, cases.points(source), strict=True))
@@ -157,15 +176,15 @@ def read_jobs(folder: store.Folder, source: StoredStudy) -> list[JudgedJob]:
         said = {name: str(word[where]) if where >= 0 else "" for name, word in words.items()}
         is_ok = said["status"] == "ok"
         case = stored.case_at(where) if is_ok else None
-        rtol = float(stored.attributes(where)["rtol"]) if is_ok else math.nan
+        run = stored.attributes(where) if is_ok else {"rtol": math.nan, "settle": math.nan}
         status = said["status"] or "missing"
-        job = JudgedJob(key, point, status, said["reason"], said["regime"], case, rtol,
-                        numbers[number], [])  # fmt: skip
+        job = JudgedJob(key, point, status, said["reason"], said["regime"], case,
+                        float(run["rtol"]), float(run["settle"]), numbers[number], [])  # fmt: skip
         found.append(job)
     return found
 
 
-COUNTS = ("steps", "rejected", "evaluations")
+COUNTS = ("steps", "rejected", "evaluations", "revolutions")
 
 
 def judges_of(job: JudgedJob) -> list[str]:
@@ -181,20 +200,24 @@ def judges_of(job: JudgedJob) -> list[str]:
 
 def judge_case(job: JudgedJob, method: str) -> Case:
     """Return the case that a judge runs: the job's, by another method and more exactly."""
-    assert job.case
+    case = job.case
+    assert case
+    if job.is_chaotic and case.solve.settle_rev == "auto":  # which waits for agreement in vain
+        settle = job.settle / case.turn
+        case = solve.with_settle_rev(case, settle, 1, settle + float(job.numbers["revolutions"]))
     rtol = max((TENTH if job.is_chaotic else TIGHTER) * job.rtol, cases.TIGHTEST)
     compiled = method in ("TSIT5", "RODAS")
     settings = replace(
-        job.case.solve, method=method, rtol=float(f"{rtol:.6g}"), accuracy="standard",
+        case.solve, method=method, rtol=float(f"{rtol:.6g}"), accuracy="standard",
         error_bars=False, horizon=False, timeout_s=SECONDS,
         max_steps=COMPILED_STEPS if compiled else SCIPY_STEPS,
     )  # fmt: skip
     output = cases.Output(keep="metrics")
-    return replace(job.case, solve=settings, output=output, body=None, sensor=None, wear=None)
+    return replace(case, solve=settings, output=output, body=None, sensor=None, wear=None)
 
 
 def study_of_judges(
-    source: StoredStudy, number: int, jobs: Sequence[JudgedJob], trials: Sequence[Case]
+    source: store.StoredStudy, number: int, jobs: Sequence[JudgedJob], trials: Sequence[Case]
 ) -> Study:
     """Return the study of the runs of one judge for each of some jobs."""
     axes = [
@@ -210,10 +233,11 @@ def hear_votes(place: store.Folder, jobs: Sequence[JudgedJob], trials: Sequence[
     """Give jobs the votes of what was run for them."""
     stored = store.read_store(place)
     at = stored.find([case.key for case in trials])
-    numbers, status = stored.numbers(at, JUDGED), stored.words("status")
+    numbers = stored.numbers(at, JUDGED)
     for number, (job, case) in enumerate(zip(jobs, trials, strict=True)):
-        vote = Vote(case.solve.method)
-        if at[number] >= 0 and status[at[number]] == "ok":
+        end = stored.status(case.key)
+        vote = Vote(case.solve.method, reason=end.reason if end else "")
+        if end and end.status == "ok":
             vote = compare(case.solve.method, job, numbers[number])
         job.votes.append(vote)
 
@@ -269,21 +293,24 @@ def table(jobs: Sequence[JudgedJob]) -> Iterator[tuple[str, ...]]:
     yield HEAD
     for job in jobs:
         vote = job.deciding
-        numbers = (f"{value:.2g}" for value in (vote.ratio, vote.error, vote.bar))
+        known = () if math.isnan(vote.ratio) else (vote.ratio, vote.error, vote.bar)
+        numbers = [f"{value:.2g}" for value in known] or [""] * 3
         judges = (f"({one.method})" if math.isnan(one.ratio) else one.method for one in job.votes)
         yield job.verdict, job.key[:8], vote.metric, *numbers, " ".join(judges)
 
 
-def summarize(jobs: Sequence[JudgedJob]) -> str:
-    """Return how many jobs ended how, in one line."""
+def summarize(jobs: Sequence[JudgedJob]) -> Iterator[str]:
+    """Yield how many jobs ended how, in one line, and why some are unjudged."""
     ends = sorted(count_ends(jobs).items(), key=lambda one: -one[1])
-    return f"{plural(len(jobs))}: " + ", ".join(f"{name} {count}" for name, count in ends)
+    yield f"{plural(len(jobs))}: " + ", ".join(f"{name} {count}" for name, count in ends)
+    unjudged = Counter(job.why for job in jobs if job.verdict == "unjudged")
+    yield from (f"{count} unjudged: {text}" for text, count in unjudged.most_common())
 
 
 def to_rows(jobs: Iterable[JudgedJob]) -> list[dict[str, Any]]:
     """Return each job as JSON says it."""
     return [
-        {"job": job.key, **job.point, "verdict": job.verdict, "reason": job.reason}
-        | job.deciding._asdict() | {"judges": [vote._asdict() for vote in job.votes]}
+        {"job": job.key, **job.point, "verdict": job.verdict, **job.deciding._asdict()}
+        | {"reason": job.why, "judges": [vote._asdict() for vote in job.votes]}
         for job in jobs
     ]  # fmt: skip

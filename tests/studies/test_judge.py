@@ -61,12 +61,13 @@ def test_a_wrong_number_that_no_bar_tells_of_is_silent(tmp_path, compsim, in_pro
 def job(**more):
     values = {
         "key": "ab" * 10, "point": {}, "status": "ok", "reason": "", "regime": "predictable",
-        "case": Case.from_values({}), "rtol": 1e-6, "numbers": {}, "votes": [],
+        "case": Case.from_values({}), "rtol": 1e-6, "settle": 3.0, "numbers": {}, "votes": [],
     }  # fmt: skip
     return judging.JudgedJob(**(values | more))
 
 
-YES, NO, LOST = judging.Vote("a", 0.1, "x"), judging.Vote("b", 3.0, "y"), judging.Vote("c")
+YES, NO = judging.Vote("a", 0.1, "x"), judging.Vote("b", 3.0, "y")
+LOST = judging.Vote("c", reason="budget_steps")
 
 
 @pytest.mark.parametrize(
@@ -89,6 +90,9 @@ YES, NO, LOST = judging.Vote("a", 0.1, "x"), judging.Vote("b", 3.0, "y"), judgin
 def test_the_majority_counts(votes, is_open, verdict):
     one = job(votes=votes)
     assert (one.is_open, one.verdict) == (is_open, verdict)
+    (row,), is_unjudged = judging.to_rows([one]), verdict == "unjudged"
+    assert bool(row["reason"]) == is_unjudged
+    assert ("a job of fewer revolutions" in row["reason"]) == (is_unjudged and LOST in votes)
 
 
 @pytest.mark.parametrize("factor", [0.01, 100.0])
@@ -125,5 +129,8 @@ def test_judges_are_unlike_the_run_and_more_exact():
     assert "RODAS" not in judging.judges_of(own)[: judging.JUDGES]
     case = judging.judge_case(smooth, "RODAS")
     assert (case.solve.method, case.solve.rtol) == ("RODAS", 1e-8)
-    assert judging.judge_case(replace(smooth, regime="chaotic"), "RODAS").solve.rtol == 1e-7
+    auto = Case.from_values({"solve": {"settle_rev": "auto", "duration_rev": "auto"}})
+    seen = {"regime": "chaotic", "case": auto, "numbers": {"revolutions": np.array(25.0)}}
+    run = judging.judge_case(replace(smooth, **seen), "RODAS").solve  # 3 s are 25 revolutions
+    assert (run.settle_rev, run.duration_rev, run.rtol) == (25.0, 50.0, 1e-7)
     assert judging.judge_case(replace(smooth, rtol=1e-11), "RODAS").solve.rtol == 1e-12
