@@ -92,10 +92,12 @@ def measured_cell(measure: Measure, value: float, bar: float, limits: Limits = N
 
 
 def value_cell(value: Any) -> Cell:
-    """Return a setting of a job: a number, or a word."""
+    """Return a setting of a job: a number, a word, or a dash where the job has none."""
     if isinstance(value, int | float | np.number):
-        return Cell(setting(float(value)), "number", None if math.isnan(value) else float(value))
-    return Cell(str(value))
+        if math.isnan(value):
+            return Cell("–", "number")
+        return Cell(setting(float(value)), "number", float(value))
+    return Cell(str(value) or "–")
 
 
 def job_row(cells: Sequence[Cell], status: str, regime: str = "", key: str = "") -> TableRow:

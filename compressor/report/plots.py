@@ -292,9 +292,9 @@ def select_jobs(
 ) -> tuple[list[tuple[str, str]], str, list[str]]:
     """Return (value, key) of jobs along an axis in its order, its title, the other axes in words.
 
-    At most `most`. Where both clearances vary, a value is both: one alone would seem to be the
-    cause of what the other does. Raises PlotError where `at` names no job, the axis itself, or an
-    axis twice.
+    At most `most`. Where both clearances vary, or words such as a law, a value is all of them: one
+    alone would seem to be the cause of what another does. Raises PlotError where `at` names no job,
+    the axis itself, or an axis twice.
     """
     fixed = {}
     for text in at:
@@ -308,8 +308,6 @@ def select_jobs(
         first = {axis.key: axis.values[0] for axis in study.axes if axis.key != over}
         fixed = first | fixed
     varied = [axis.key for axis in study.axes if axis.key not in (over, *fixed)]
-    group = over.partition(".")[0]
-    beside = [key for key in varied if key.partition(".")[0] == group == "clearance_mm" != over]
     jobs = [
         (point, key)
         for point, key in zip(cases.points(study), study.keys, strict=True)
@@ -317,6 +315,13 @@ def select_jobs(
     ]
     if not jobs:
         raise PlotError(f"no job of {study.name} has {', '.join(at)}")
+    group = over.partition(".")[0]
+    beside = [
+        key
+        for key in varied
+        if key.partition(".")[0] == group == "clearance_mm" != over
+        or any(isinstance(point.get(key), str) for point, _ in jobs)
+    ]
     numbers = [isinstance(point.get(over), int | float) for point, _ in jobs]
     # a job without a clearance comes first
     jobs.sort(key=lambda job: n if isinstance(n := job[0].get(over), int | float) else -math.inf)

@@ -141,16 +141,18 @@ def test_a_study_is_drawn_along_an_axis(plot, folder, unpainted):
     assert "Here machine.speed_rpm 400." in default
 
 
-def test_rows_name_both_clearances():
-    """Rows by one clearance alone showed the other's effect as if it were its own."""
+def test_rows_name_both_clearances_and_words():
+    """Rows by one clearance alone showed the other's effect, or a law's, as if it were its own."""
     sizes = [0.3, None, 0.1], [0.05, None, 0.35]  # the job in the middle has ideal joints
     axes = [SimpleNamespace(key=f"clearance_mm.{joint}", values=values)
             for joint, values in zip(JOINTS, sizes, strict=True)]  # fmt: skip
+    axes.append(SimpleNamespace(key="contact.law", values=["impact", None, "hertz"]))
     study = SimpleNamespace(name="two", axes=axes, keys=["a", "i", "b"], jobs=3, is_grid=False)
     jobs, title, where = select_jobs("", study, axes[0].key, (), 5)
-    assert jobs == [(" / ", "i"), ("0.1 / 0.35", "b"), ("0.3 / 0.05", "a")]
-    assert title == "clearance, big end (mm) / clearance, small end (mm)"
-    assert where == [f"in the order of {axes[0].key}, {axes[1].key} vary along with it"]
+    assert jobs == [(" /  / ", "i"), ("0.1 / 0.35 / hertz", "b"), ("0.3 / 0.05 / impact", "a")]
+    assert title == "clearance, big end (mm) / clearance, small end (mm) / law"
+    varied = f"{axes[1].key}, {axes[2].key} vary along with it"
+    assert where == [f"in the order of {axes[0].key}, {varied}"]
 
 
 def test_a_damaged_job_is_a_row_without_series(folder, tmp_path, compsim, unpainted):

@@ -7,7 +7,7 @@ from swept_made import grid
 
 from compressor.report.answer import finding, name_jobs, rank_findings, study_findings, worn_joints
 from compressor.report.figures.sweep_data import MEASURES
-from compressor.report.page import format_measure
+from compressor.report.page import format_measure, value_cell
 
 FIRST = {one.variable: one for one in reversed(MEASURES)}  # of joints and axes the first
 PEAK, RMS, FORCE, LOSS, DEPTH, REVERSAL, TENSION, RATE = (FIRST[name] for name in (
@@ -178,3 +178,4 @@ def test_joints_with_clearance_are_found_in_any_job(study):
 )  # fmt: skip
 def test_a_page_has_four_digits(value, bar, text):
     assert format_measure(PEAK, value, bar) == text
+    assert value_cell(np.nan).text == value_cell("").text == "–"  # of a key that a job has not

@@ -103,12 +103,12 @@ def test_points_are_jobs_over_what_matters_most():
 
 
 def test_words_are_colours():
-    load = np.array(["spring", "gas"] * 30)
+    load = np.array(["spring", "gas", "a", "b", "c", "d"] * 10)
     values = np.where(load == "spring", SPEED, 5 - SPEED)
     panel = panels_of(plan(listed(COLUMNS | {"load": load}, values))["points"].figure)[0]
     one = by_name(panel)
-    assert one["load spring"].y == pytest.approx(values[::2])
-    assert one["load gas"].marker.color != one["load spring"].marker.color
+    assert one["load spring"].y == pytest.approx(values[::6])
+    assert len({trace.marker.color for trace in one.values()}) == 6
 
 
 def test_what_is_not_known_is_marked():

@@ -150,6 +150,15 @@ def scale_y(panel: Panel, values: np.ndarray, bars: ArrayLike = ()) -> float:
     return high - low
 
 
+def lines_of(count: int, is_ramp: bool) -> Sequence[style.LineStyle]:
+    """Return so many lines, of colours from dark to light if they are many, or numbers' ramp."""
+    if count <= (1 if is_ramp else len(style.CYCLE)):
+        return style.CYCLE[:count]
+    ramp = style.palette("viridis", 256)
+    shares = np.linspace(0.0, 0.88, count)
+    return [style.LineStyle(ramp[int(256 * share)], (), 1.5) for share in shares]
+
+
 def lines_for(axis: PlottedAxis, is_points: bool) -> dict[int, style.LineStyle]:
     """Return lines by the numbers of an axis' values, from dark to light where these are numbers.
 
@@ -157,13 +166,7 @@ def lines_for(axis: PlottedAxis, is_points: bool) -> dict[int, style.LineStyle]:
     tell apart by lightness.
     """
     chosen = thin_places(axis.values.size, MAX_LINES).tolist()
-    lines = list(style.CYCLE[: len(chosen)])
-    if len(chosen) > len(style.CYCLE) or (not axis.is_words and len(chosen) > 1):
-        shares = np.linspace(0.0, 0.88, len(chosen))
-        lines = [
-            style.LineStyle(style.palette("viridis", 256)[int(256 * share)], (), 1.5)
-            for share in shares
-        ]
+    lines = lines_of(len(chosen), not axis.is_words)
     return {
         n: replace(line, marker=MARKERS[n % len(MARKERS)] if axis.is_words else "circle",
                    markersize=3.4, linewidth=0.0 if is_points else line.linewidth)
@@ -267,7 +270,7 @@ def grouping(sweep: PlottedSweep) -> tuple[str, list[Any], np.ndarray]:
     The first axis of words with no more of them than there are lines to tell apart.
     """
     for axis in sweep.axes:
-        if axis.is_words and len(axis.words) <= len(style.CYCLE):
+        if axis.is_words and len(axis.words) <= MAX_LINES:
             return axis.phrase, axis.words, axis.places.astype(int)
     return "", [""], np.zeros(sweep.status.shape, int)
 
@@ -281,12 +284,11 @@ def plot_points(panel: Panel, sweep: PlottedSweep, axis: int, measure: Measure) 
     phrase, words, group = grouping(sweep)
     shown = np.zeros(y.size, bool)
     shown[thin_places(y.size, MAX_POINTS)] = True
-    for n, word in enumerate(words):
+    for n, (word, line) in enumerate(zip(words, lines_of(len(words), False), strict=True)):
         name = name_value(phrase, word) if phrase else "a job"
         here = shown & (group == n)
-        color = style.CYCLE[n].color if phrase else style.BLUE
         alpha = 0.55 if y.size < 500 else 0.35
-        dots = style.mark(color, MARKERS[n], POINT, edge_width=0.0, alpha=alpha)
+        dots = style.mark(line.color, MARKERS[n % len(MARKERS)], POINT, edge_width=0.0, alpha=alpha)
         mark_points(panel, x[here], y[here], keys[here], dots, name)
     ring = shown & sweep.chaotic
     mark_points(panel, x[ring], y[ring], keys[ring], ring_around(POINT), CHAOTIC)
