@@ -75,7 +75,7 @@ class FolderLost(StoreError):
 class StoreWarning(CompsimWarning):
     """What a store lacks that was requested, such as a damaged file; its reader goes on without.
 
-    Its jobs count as missing, and the next run computes them again. To stop instead:
+    Jobs of a batch count as missing, and the next run computes them again. To stop instead:
 
     >>> import warnings
     >>> import compressor

@@ -14,6 +14,7 @@ import json
 import math
 import os
 import shlex
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +23,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from compressor.cases import MODEL_VERSION, Axis, Study, phrase_of, points, row_of, values_given
 from compressor.digits import setting
 from compressor.program import VERSION, did_you_mean, library_versions
-from compressor.store.files import Folder, StoreError, WrongName, publish, refusals, system_error
+from compressor.store.files import (
+    Folder,
+    StoreError,
+    StoreWarning,
+    WrongName,
+    publish,
+    refusals,
+    system_error,
+)
+from compressor.store.netcdf import DamagedFile
 
 if TYPE_CHECKING:
     import numpy as np
@@ -174,15 +184,36 @@ def no_results(folder: Folder) -> WrongName:
 
 
 def read_studies(folder: Folder) -> list[StoredStudy]:
-    """Return all studies of a store, by name. Raises WrongName where there is none."""
+    """Return all studies of a store, by name; of damaged ones a StoreWarning is given.
+
+    Raises WrongName where there is none, and DamagedFile where all are damaged.
+    """
     paths = study_paths(folder)
     if not paths:
         raise no_results(folder)
-    return [read_study(path) for path in paths]
+    found: list[StoredStudy] = []
+    damaged: list[DamagedFile] = []
+    for path in paths:
+        try:
+            found.append(read_study(path))
+        except DamagedFile as error:
+            damaged.append(error)
+    if not found:
+        raise damaged[0]
+    for damage in damaged:
+        warnings.warn(f"{damage}: it is left out", StoreWarning, stacklevel=3)
+    return found
+
+
+def refuse_damaged(folder: Folder, name: str) -> None:
+    """Raise DamagedFile where the study of a name, which `read_studies` left out, is damaged."""
+    for path in study_paths(folder):
+        if path.stem == name:
+            read_study(path)
 
 
 def read_study(path: Path) -> StoredStudy:
-    """Return a study from its file. Raises StoreError where the file is not what was written."""
+    """Return a study from its file. Raises DamagedFile where it is not what was written."""
     try:
         data = path.read_bytes()
         plain = json.loads(data)
@@ -199,7 +230,7 @@ def read_study(path: Path) -> StoredStudy:
         raise system_error(path, error) from error
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         problem = "is damaged, or of another version of compsim"
-        raise StoreError(path, problem, "delete it and run its case file again") from error
+        raise DamagedFile(path, problem, "delete it and run its case file again") from error
     return study
 
 
@@ -224,6 +255,7 @@ def find_study(
     if name is None:
         raise WrongName(folder, "holds several studies", f"name one: {list_few([*studies])}")
     if name not in studies:
+        refuse_damaged(folder, name)
         holds = f"it holds {list_few([*studies]) or 'none'}"
         raise WrongName(folder, f"holds no study {name!r}", did_you_mean(name, studies) or holds)
     return studies[name]
@@ -273,6 +305,7 @@ def whole_key(
     matches = [key for key in known if key.startswith(beginning)]
     if len(matches) == 1:
         return matches[0]
+    refuse_damaged(folder, beginning)
     if matches:
         problem = f"{len(matches)} jobs' keys begin with {beginning!r}: {list_few(matches)}"
         raise WrongName(folder, problem, "give more of the key")
