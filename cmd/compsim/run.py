@@ -47,6 +47,7 @@ def run(command, configs, folder, jobs, rerun, shard, scheduler, quiet, **how) -
     """
     if scheduler and jobs:
         raise click.UsageError("-j counts processes here; a dask cluster uses all its workers")
+    from compressor.store import list_orphans
     from compressor.sweep import Options, connect_cluster, cores, sweep
 
     studies = read_cases(configs, quiet, **how)
@@ -60,6 +61,13 @@ def run(command, configs, folder, jobs, rerun, shard, scheduler, quiet, **how) -
         asked = Options(
             command, how["overrides"], bool(rerun), shard, elsewhere, progress.count_failed
         )
+        for name, keys in list_orphans(folder, studies).items():
+            be = "is" if len(keys) == 1 else "are"
+            show = shlex.join(["compsim", "show", keys[0], "-r", folder])
+            screen.say(
+                f"{name}: its study in {folder} is replaced, and {len(keys)} of its jobs {be} in "
+                f"no study now (such as: {show}); another name keeps both"
+            )
         summary = sweep(studies, folder, jobs or cores(), progress, asked)
     report_run(summary, folder, quiet)
     return screen.SOME_FAILED if summary.failed else screen.DONE

@@ -5,17 +5,19 @@ values HDF5 compares with their checksums, names the jobs that damage costs, and
 aside, so that a run computes them again. There is no index: jobs whose batch is gone are missing.
 """
 
+import contextlib
 import os
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import filterfalse
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from compressor.cases import Case, points
+from compressor.cases import Case, Study, points
 from compressor.metrics import NUMBERS
 from compressor.outcome import Regime
 from compressor.store.batch import FOLDER as BATCHES
@@ -46,6 +48,25 @@ def find_owners(studies: Iterable[StoredStudy], keys: Iterable[str]) -> dict[str
                 if key in found:
                     found[key].setdefault(study.name, point)
     return found
+
+
+def list_orphans(folder: Folder, studies: Sequence[Study]) -> dict[str, list[str]]:
+    """Return the stored jobs that are in no study once some studies take the place of others.
+
+    Keys by the name of the study that loses them. Raises StoreError.
+    """
+    names, known = {study.name for study in studies}, list[StoredStudy]()
+    for path in study_paths(folder):
+        with contextlib.suppress(StoreError, FileNotFoundError):  # a damaged one has lost its own
+            known.append(read_study(path))
+    kept = {key for study in studies for key in study.keys}
+    kept |= {key for study in known if study.name not in names for key in study.keys}
+    left = {one.name: [*filterfalse(kept.__contains__, one.keys)] for one in known}
+    if not any(left.values()):
+        return {}
+    stored = read_store(folder).keys()
+    found = {name: [key for key in keys if key in stored] for name, keys in left.items()}
+    return {name: keys for name, keys in found.items() if keys}
 
 
 @dataclass(frozen=True)

@@ -93,8 +93,13 @@ def test_the_next_run_has_the_same_jobs(tmp_path, monkeypatch, compsim, in_proce
     compsim(*command, "--only", "clearance_mm < 0.15")
     assert standings("results")[0].missing == 1
     next_run = compsim("status").err.removeprefix("next: ").strip()
-    compsim(*shlex.split(next_run)[1:], "--quiet", "-j", "1")
+    assert not compsim(*shlex.split(next_run)[1:], "--quiet", "-j", "1").err
     assert standings("results")[0].missing == 0
+    err = compsim(*command[:-1], "--set=clearance_mm=0.1").err
+    said = "one: its study in results is replaced, and 1 of its jobs is in no study now (such as: "
+    assert err.startswith(said)
+    show = shlex.split(err.removeprefix(said).partition(")")[0])
+    assert "ok" in compsim(*show[1:]).out
 
 
 def test_damage_is_told_where_its_jobs_count_as_missing(mix, compsim):
