@@ -127,13 +127,13 @@ class Effects:
 def grid_effects(values: np.ndarray) -> Effects | None:
     """Return the main and total effects of a grid's axes; None where too little of it is known.
 
-    values: an axis a key, nan where unknown. Every point of the grid counts alike, so that the
-    decomposition of the variance (Hoeffding 1948; Sobol', Mathematics and Computers in Simulation
-    55, 2001, 271-280) is exact: S_i = V(E(y | x_i)) / V(y) and T_i = 1 - V(E(y | all but x_i)) /
-    V(y) (Saltelli et al., Global Sensitivity Analysis: The Primer, 2008, chapters 1 and 4). Both
-    are nan where all values are the same. Values of an axis at which nothing is known are left
-    out. Other unknown points, at most MAX_GAPS of all, take the sum of their axes' main effects
-    (Healy and Westmacott, Applied Statistics 5, 1956, 203-206).
+    values: an axis a key, nan where unknown, not all the same. Every point of the grid counts
+    alike, so that the decomposition of the variance (Hoeffding 1948; Sobol', Mathematics and
+    Computers in Simulation 55, 2001, 271-280) is exact: S_i = V(E(y | x_i)) / V(y) and
+    T_i = 1 - V(E(y | all but x_i)) / V(y) (Saltelli et al., Global Sensitivity Analysis: The
+    Primer, 2008, chapters 1 and 4). Values of an axis at which nothing is known are left out. Other
+    unknown points, at most MAX_GAPS of all, take the sum of their axes' main effects (Healy and
+    Westmacott, Applied Statistics 5, 1956, 203-206).
     """
     whole_grid = values.size
     for axis in range(values.ndim):
@@ -146,11 +146,8 @@ def grid_effects(values: np.ndarray) -> Effects | None:
     values = fill_unknown(values, unknown)
     axes = range(values.ndim)
     other_axes = [tuple(n for n in axes if n != axis) for axis in axes]
-    scaled = (values - values.mean()) / (np.ptp(values) or 1.0)
+    scaled = (values - values.mean()) / np.ptp(values)
     whole = scaled.var()
-    if not whole:
-        nothing = np.full(values.ndim, math.nan)
-        return Effects("grid", nothing, nothing, unknown=lost)
     main = np.array([scaled.mean(axis=others).var() for others in other_axes]) / whole
     total = np.array([scaled.var(axis=axis).mean() for axis in axes]) / whole
     return Effects("grid", main, total, unknown=lost)
@@ -182,15 +179,13 @@ def fill_unknown(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
 def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effects | None:
     """Return the effects of keys whose values a design drew; None where too little is known.
 
-    columns: a key's value at each point, or words; values: (points,), nan where unknown. Of a
-    `saltelli` design Sobol's indices, by the first blocks without an unknown point, at most
-    MAX_BASE; else correlations, each over the points that have its key.
+    columns: a key's value at each point, or words; values: (points,), nan where unknown, not all
+    the same. Of a `saltelli` design Sobol's indices, by the first blocks without an unknown point,
+    at most MAX_BASE; else correlations, each over the points that have its key.
     """
     good = np.isfinite(values)
     if good.sum() < MIN_POINTS:
         return None
-    if not np.ptp(values[good]):
-        return Effects("rank", np.full(len(columns), math.nan))
     lost = int((~good).sum())
     numeric = all(column.dtype.kind in "fiu" for column in columns)
     design = saltelli_design(np.stack(columns, axis=1).astype(float)) if numeric else None

@@ -37,11 +37,6 @@ def test_gaps_of_a_sum_are_filled_rightly():
     assert effects.grid_effects(values) is None
 
 
-def test_what_never_changes_has_no_effects():
-    assert np.isnan(effects.grid_effects(np.full((3, 2), 5.0)).main).all()
-    assert np.isnan(effects.sampled_effects([np.arange(9.0)], np.full(9, 5.0)).main).all()
-
-
 def test_other_designs_have_correlations_of_ranks():
     rng = np.random.default_rng(1)
     x, idle = rng.random((2, 200))
@@ -63,10 +58,8 @@ def test_of_two_words_the_ratio_is_the_correlation():
     rng = np.random.default_rng(2)
     code = rng.integers(2, size=80)
     values = rng.normal(size=80) + code
-    found, low, high = effects.correlate_ranks(np.array(["a", "b"])[code], values)
+    found, _, _ = effects.correlate_ranks(np.array(["a", "b"])[code], values)
     assert found == pytest.approx(spearmanr(code, values).statistic)
-    assert math.isnan(low)
-    assert math.isnan(high)
 
 
 def test_intervals_of_correlations_hold_as_often_as_they_say():

@@ -98,7 +98,6 @@ def test_the_worn_joint_s_force_and_the_reversal_stand_there_though_they_do_not_
         "Peak rod load, tension", "Rms acceleration",
         "Peak contact force, small end", "Rod load reversal",
     ]  # fmt: skip
-    # the hardest knock heads the screen, and what the other joint does stands beside it
     assert found[0].change == "1 of 3 jobs knocks; big end: none of 3 jobs knocks"
     assert found[1].change == "from nearly nothing"  # what appears ranks before what grows
     assert (found[-2].high, found[-2].change) == ("80 to 82.20 kN", "nearly the same in all jobs")

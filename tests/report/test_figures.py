@@ -323,12 +323,11 @@ def test_the_cam_and_the_gas_are_told_by_their_numbers(drawn):
 
 
 @pytest.mark.parametrize(
-    ("values", "text", "units"),
-    [(1234.56, "1235 N", "usual"), ([0.0123456, -7.0], "0.01235, -7 N", "si"),
-     (1.4e-9, "0 N", "usual"), (1234.56, "1.235 kN", "plant")],
-)  # fmt: skip
-def test_numbers_have_four_digits(values, text, units):
-    assert spell(values, "N", units) == text
+    ("values", "text"), [(1234.56, "1235 N"), ([0.0123456, -7.0], "0.01235, -7 N"), (1.4e-9, "0 N")]
+)
+def test_numbers_have_four_digits(values, text):
+    assert spell(values, "N") == text
+    assert spell(1234.56, "N", "plant") == "1.235 kN"
 
 
 def test_captions_of_oiled_joints_speak_of_dry_contact():
