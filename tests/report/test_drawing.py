@@ -201,13 +201,15 @@ def test_panels_that_share_decades_draw_them_alike():
 
 @pytest.mark.parametrize("top", [39.238, 3e7, 3e-7])
 def test_ticks_are_whole_numbers(top):
-    """The offset +3.923e1 stood over a title."""
-    drawing, grid = make_grid(1, 1, 2.0)
+    """The offset +3.923e1 stood over a title; 0.000000225 beside a map reached into the next."""
+    drawing, grid = make_grid(1, 2, 2.0)
     grid[0, 0].plot([0, 1], [0.9999 * top, top], LineStyle("#000000"))
+    grid[0, 1].map(np.zeros(1), np.zeros(1), np.array([[top]]), palette("cividis"), (0.0, top))
     with rc_context(pictures.STYLE):
         painted = pictures.paint(drawing.figure())
         painted.draw_without_rendering()
     assert painted.axes[0].yaxis.get_offset_text().get_text() == ""
+    assert max(len(tick.get_text()) for tick in painted.axes[2].get_yticklabels()) < 9
 
 
 def test_two_processes_draw_what_one_does(figures, two_cores, monkeypatch, tmp_path, capfd):

@@ -25,7 +25,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
 from matplotlib.transforms import Bbox
 
-from compressor.digits import plural
+from compressor.digits import MIN_DECIMAL, plural
 from compressor.program import work_beside
 from compressor.report.figures.drawing import (
     INCH,
@@ -286,7 +286,10 @@ def paint_map(axes: Axes, trace: go.Heatmap) -> None:
         scale = trace.colorbar
         box = axes.get_position()
         beside = axes.figure.add_axes((box.x1 + 6 / WIDTH, box.y0, 10 / WIDTH, box.height))
-        bar = axes.figure.colorbar(ScalarMappable(norm, colors), cax=beside)
+        is_tiny = max(map(abs, (trace.zmin, trace.zmax))) < MIN_DECIMAL  # zeros would be too long
+        bar = axes.figure.colorbar(
+            ScalarMappable(norm, colors), cax=beside, format="%g" if is_tiny else None
+        )
         bar.set_label(words(scale.title.text or ""))
         if scale.tickvals is not None:
             bar.set_ticks(scale.tickvals, labels=scale.ticktext)
