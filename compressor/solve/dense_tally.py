@@ -26,7 +26,7 @@ from compressor.physics import (
     tally_energy,
 )
 from compressor.reasons import Reason
-from compressor.solve.request import SAME_TIME, Trajectory, overdue, revolutions, split_segments
+from compressor.solve.request import SAME_TIME, Trajectory, revolutions, split_segments
 from compressor.solve.series import rows_at
 from compressor.solve.si_record import length_and_speed, natural_sizes
 
@@ -185,7 +185,7 @@ def closed_form(
     tally_energy(observe(phases[0], times[:1])[0], flows, result.tally)
     for begin, end, phase in zip(edges[:-1], edges[1:], phases, strict=True):
         if time.monotonic() > deadline:
-            result.reason, result.detail = Reason.BUDGET_SECONDS, overdue(timeout)
+            result.reason = Reason.BUDGET_SECONDS
             result.stop_time, states[times >= begin] = float(begin), math.nan
             break
         steps = np.linspace(begin, end, pieces + 1)

@@ -129,11 +129,6 @@ class Stop(Exception):
         super().__init__(f"{reason}: {detail}")
 
 
-def overdue(timeout: float) -> str:
-    """Return what is wrong with a run that takes longer (s)."""
-    return f"more than {timeout:g} s of wall time"
-
-
 def check_state(p: np.record, state: np.ndarray) -> None:
     """Raise Stop where a state leaves what a mechanism with features can do."""
     beyond = beyond_model(state, p)
