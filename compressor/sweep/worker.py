@@ -126,12 +126,12 @@ def open_socket(pipe: Connection) -> socket.socket:
 def serve_batches(
     pipe: Connection, work: Callable[[Any], Any], store: Store | None, target_seconds: float
 ) -> None:
-    """Run the batches that come through a pipe, until it is closed.
+    """Run the batches that come through a pipe, until it is closed, also while one is at work.
 
     The place of each job goes home before it runs, and the number of all when they have run. An
     answer is a list of ends, without the rest that is given back, or StoreError.
     """
-    with contextlib.suppress(EOFError):
+    with contextlib.suppress(EOFError, OSError):  # of the pipe alone: `attempt` has the job's
         while True:
             payloads, ends, began = pipe.recv(), [], time.monotonic()
             for place, payload in enumerate(payloads):

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from functools import partial
+from multiprocessing import Pipe
 from pathlib import Path
 
 import bad_jobs
@@ -19,7 +20,7 @@ from conftest import wait_for
 from compressor.store import StoreError
 from compressor.sweep import pool
 from compressor.sweep.pool import WorkersFailed, run_batches
-from compressor.sweep.worker import MAX_TEXT, Workers
+from compressor.sweep.worker import MAX_TEXT, Workers, serve_batches
 
 RULES = {"memory": LEAST, "grace": 0.3}
 
@@ -252,6 +253,10 @@ list(run_batches(bad_jobs.announced, jobs, Workers(2)))
     parent.wait(60)
     wait_for(lambda: not any(map(is_running, pids)))
     assert parent.communicate(timeout=60) == ("", "")  # until the last process of all has ended
+    pipe, theirs = Pipe()
+    theirs.send([1])
+    theirs.close()
+    serve_batches(pipe, work, None, 1.0)  # in silence, too, where its parent has just died
 
 
 def test_memory_is_shared_among_workers(monkeypatch, tmp_path):
