@@ -15,9 +15,9 @@ def verify(folder, as_json) -> int:
     \b
     compsim verify -r results
 
-    Damaged files are listed with the jobs that are lost with them, by study and swept values, and
-    with the command that computes them again; batches of jobs are renamed to .damaged. Exit code 5
-    if any is damaged.
+    Damaged files are listed with the jobs that are lost with them (of a batch that cannot be opened
+    all that are missing), by study and swept values, and with the command that computes them again;
+    batches of jobs are renamed to .damaged. Exit code 5 if any is damaged.
     """
     from compressor.store import verify as compare
 
@@ -35,7 +35,8 @@ def verify(folder, as_json) -> int:
         screen.say("no damage")
         return screen.DONE
     lost = len({key for damage in damages for key in damage.studies})
-    screen.say(f"{plural(len(damages), 'damaged file')}, {plural(lost)} lost")
+    most = "up to " if lost and any(damage.at_most for damage in damages) else ""
+    screen.say(f"{plural(len(damages), 'damaged file')}, {most}{plural(lost)} lost")
     for command in screen.run_commands((one for damage in damages for one in damage.again), folder):
         screen.say(f"to repair: {command}")
     return screen.STORE

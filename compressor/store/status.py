@@ -73,8 +73,9 @@ def list_orphans(folder: Folder, studies: Sequence[Study]) -> dict[str, list[str
 class Damage:
     """A file of a store that is gone or not what was written, and the jobs that are lost with it.
 
-    studies: those of each of the lost jobs by key. A run of `again` computes them again; `remedy`
-    is what else is to be done, or "".
+    studies: those of each of the lost jobs by key; at_most: it cannot be known which of these the
+    file had, since it cannot be opened. A run of `again` computes them again; `remedy` is what else
+    is to be done, or "".
     """
 
     path: Path
@@ -82,6 +83,7 @@ class Damage:
     remedy: str
     studies: dict[str, Owners]
     again: tuple[Again, ...]
+    at_most: bool = False
 
 
 def verify(folder: Folder) -> list[Damage]:
@@ -93,12 +95,12 @@ def verify(folder: Folder) -> list[Damage]:
     studies: list[StoredStudy] = []
     found: list[Damage] = []
 
-    def note(error: StoreError, keys: Iterable[str], remedy: str) -> None:
-        """Note damage that costs some jobs; remedy: where it costs none."""
+    def note(error: StoreError, keys: Iterable[str], remedy: str, at_most: bool = False) -> None:
+        """Note damage that costs some jobs, at most; remedy: where it costs none."""
         path, belong = Path(error.path), find_owners(studies, keys)
         names = {name for owners in belong.values() for name in owners}
         again = tuple(study.again for study in studies if study.name in names)
-        found.append(Damage(path, error.problem, "" if belong else remedy, belong, again))
+        found.append(Damage(path, error.problem, "" if belong else remedy, belong, again, at_most))
         if path.parent.name == BATCHES:
             set_aside(path)
 
@@ -110,8 +112,8 @@ def verify(folder: Folder) -> list[Damage]:
     stored = read_store(place)
     paths, source, _ = stored.places
     absent = {key for study in studies for key in study.keys} - stored.keys()
-    for damage in stored.damaged:  # even their keys cannot be read
-        note(damage, sorted(absent), "delete it: no job needs it")
+    for damage in stored.damaged:  # not even their keys can be read
+        note(damage, sorted(absent), "delete it: no job needs it", at_most=True)
     with refusals(place):
         others = sorted(place.glob("**/*.nc"))
     if not (studies or found or paths or others):

@@ -210,3 +210,5 @@ def test_jobs_in_a_damaged_batch_count_as_missing_with_a_warning(tmp_path, comps
     assert lost == {str(paths[0]): [key(0)], str(paths[2]): [*map(key, range(2, 400))]}
     assert [path.exists() for path in paths] == [False, True, False]  # a run sees what is missing
     compsim("verify", "-r", tmp_path)
+    paths[1].write_bytes(b"")  # of which nobody knows that it had one job
+    assert "1 damaged file, up to 400 jobs lost" in compsim("verify", "-r", tmp_path, code=5).err
