@@ -10,13 +10,14 @@ have what xarray's `to_netcdf` writes.
 import itertools
 import os
 import re
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.store.files import Folder, WrongName, publish
+from compressor.store.files import Folder, StoreWarning, WrongName, publish
 from compressor.store.sensor_records import job_record
 from compressor.store.stored import Stored, read_store
 from compressor.store.studies import StoredStudy, find_study, read_studies, whole_key
@@ -81,7 +82,11 @@ def _encode_job(stored: Stored, key: str) -> tuple[int, bytes]:
     if found := job_record(stored, key):
         from compressor.vibration import record_columns  # loads parts of SciPy
 
-        table |= record_columns(found.times, found.values, found.tacho)
+        table |= (more := record_columns(found.times, found.values, found.tacho))
+        if "tacho" not in more:
+            problem = "no column tacho: its sensor's record passes top dead centre less than twice"
+            remedy = "raise solve.duration_rev or sensor.length_rev"
+            warnings.warn(f"job {key}: {problem}; {remedy}", StoreWarning, stacklevel=3)
     return samples, encode_csv(table)
 
 
