@@ -4,7 +4,6 @@ import json
 import sys
 
 import numpy as np
-import page_tables
 import pytest
 
 from compressor.analysis.cautions import (
@@ -99,13 +98,6 @@ def test_what_is_given_or_goes_with_the_defaults_is_not_told_of(values):
     assert not keys & {key for key, _ in odd(**values)}
 
 
-def test_a_sweep_is_told_of_once(read):
-    found = cautions(read("joint: both\nclearance_mm: [0.2, 0.3, 0.02, 0.03]\n"))
-    (one,) = found
-    assert (one.key, one.jobs, one.of) == ("clearance_mm", 2, 4)
-    assert one.message.startswith("0.02 mm is less than the contact gives way, about 0.0")
-
-
 def test_a_unit_is_told_of_once_and_in_place_of_what_follows_from_it(read):
     text = "joint: big_end\nclearance_mm: [0.2, 0.3]\ncontact: {stiffness_N_per_mm15: 336}\n"
     told = (
@@ -127,12 +119,6 @@ def test_a_large_sweep_is_sampled_evenly_and_always_the_same(read, monkeypatch):
     assert found == cautions(many)
     assert 100 <= deep.of <= 102
     assert 0.4 < deep.jobs / deep.of < 0.6
-
-
-def test_the_pages_examples_that_are_plain_are_told_nothing(read):
-    text = (page_tables.ROOT / "README.md").read_text(encoding="utf-8")
-    example = text.split("```yaml\n# bearing-wear.yaml\n")[1].split("```")[0]
-    assert cautions(read(example)) == []
 
 
 # ---- slips of units: values that are in another unit, and some that are meant ------------------
