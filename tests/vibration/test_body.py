@@ -85,10 +85,7 @@ def test_a_step_moves_each_freedom_by_its_closed_form():
     for motion, height, frequency in (
         (found["x"], 2.0, 60.0), (found["y"], -1.0, 12.0), (found["rocking"], 2.0, 7.0)
     ):  # fmt: skip
-        expected = stepped(height, frequency, 0.03)
-        np.testing.assert_allclose(
-            motion.displacement, expected, rtol=0, atol=1e-10 * np.abs(expected).max()
-        )
+        close(motion.displacement, stepped(height, frequency, 0.03))
 
 
 def test_only_the_freedoms_that_are_named_move():
@@ -105,9 +102,6 @@ def test_the_moment_is_taken_about_the_mass_centre():
     through = 0.3 * y - (-0.2) * x  # its moment about the crank's centre
     found = body_motion(body, forces(x, y, through), steady=False)
     assert np.abs(found["rocking"].displacement).max() < 1e-15
-    other = body_motion(body, forces(x, y, through + 40.0), steady=False)
-    expected = stepped(1.0, 20.0, 0.03)
-    np.testing.assert_allclose(other["rocking"].displacement, expected, atol=1e-10 * expected.max())
 
 
 def test_a_point_off_the_centre_moves_with_rocking():

@@ -35,14 +35,6 @@ def written(tmp_path):
     return write
 
 
-def test_a_record_reads_back(written):
-    found = read_record(written([TIMES, VALUES, voltage()]))
-    np.testing.assert_allclose(found.times, TIMES, atol=1e-12)
-    np.testing.assert_array_equal(found.values, VALUES)
-    np.testing.assert_allclose(found.tacho, PULSES, atol=1e-5)  # a sine is bent between samples
-    assert math.isnan(found.clipped)
-
-
 @pytest.mark.parametrize("width", [0.001, 0.002, 0.05])  # s: one sample, two, half a revolution
 def test_a_pulse_s_shape_does_not_change_the_speed_of_a_steady_machine(width, written):
     turn = 0.1003  # the pulses step through the samples
@@ -160,6 +152,7 @@ def test_records_of_every_type_are_read(suffix, hints, error, tmp_path):
     np.testing.assert_allclose(found.times, TIMES, rtol=0, atol=1e-12)
     np.testing.assert_allclose(found.values, VALUES, rtol=error, atol=0)
     np.testing.assert_allclose(found.tacho, PULSES, atol=1e-5)
+    assert math.isnan(found.clipped)
 
 
 @pytest.mark.parametrize(

@@ -48,8 +48,8 @@ def test_a_sine():
 
 
 def test_only_the_level_knows_the_size():
-    small, large = (describe(TIMES, size * NOISE, TACHO) for size in (1e-3, 1e3))
-    assert large["level"] - small["level"] == pytest.approx(6.0, abs=1e-12)
+    small, large = (describe(TIMES, size * NOISE, TACHO) for size in (1e-6, 1e6))
+    assert large["level"] - small["level"] == pytest.approx(12.0, abs=1e-12)
     for name in {*FEATURES} - {"level"}:
         assert large[name] == pytest.approx(small[name], rel=1e-9, abs=1e-9)
 
