@@ -14,7 +14,7 @@ from compsim.cli import main
 from conftest import assert_same_bits, jobs_here, without_pictures
 from published import COEFFICIENT, rubbing
 
-from compressor.analysis.wear import interpolate_hours, rubbing_work
+from compressor.analysis.wear import rubbing_work
 from compressor.cases import Case, Wear, load_cases
 from compressor.solve import simulate
 from compressor.store.files import StoreError
@@ -267,7 +267,7 @@ def test_a_stage_that_fails_ends_its_machine_with_a_reason(solve, opened, reason
     assert worn.over(stage)
 
 
-# ---- what rubs, and hours between stages
+# ---- what rubs
 
 
 @pytest.mark.parametrize(("joint", "more"), [
@@ -291,10 +291,3 @@ def test_what_rubs_is_told_a_revolution():
         for n in (3, 4)
     )
     assert two[0] == pytest.approx(one[0], rel=1e-3)
-
-
-def test_a_clearance_is_reached_on_a_straight_line():
-    hours, opened = np.array([0.0, 2.0, 3.0]), np.array([1.0, 2.0, 4.0])
-    assert interpolate_hours(hours, opened, 3.0) == 2.5
-    assert [interpolate_hours(hours, opened, one) for one in (0.5, 1.0, 2.0)] == [0.0, 0.0, 2.0]
-    assert math.isinf(interpolate_hours(hours, opened, 4.5))
