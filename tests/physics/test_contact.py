@@ -14,7 +14,6 @@ from compressor.physics.mechanism import corner_force
 from compressor.solve.si_record import record
 
 K = 3.36e5 * 1000**1.5
-C = 2e-4  # m
 
 
 def law(**values):
@@ -29,9 +28,8 @@ def test_rise_is_a_cubic_and_constant_outside_to_the_bit(s, h):
     assert rise(s) == h
 
 
-@pytest.mark.parametrize(("force", "depth_mm"), [(825, 0.018), (3087, 0.044)])
-def test_static_penetration(force, depth_mm):
-    assert (force / K) ** (2 / 3) * 1e3 == pytest.approx(depth_mm, abs=5e-4)
+@pytest.mark.parametrize("force", [825, 3087])
+def test_static_penetration(force):
     assert normal_force((force / K) ** (2 / 3), 0.0, 1.0, K, 2e-4, law())[0] == pytest.approx(force)
 
 

@@ -6,6 +6,7 @@ import time
 import numpy as np
 import pytest
 import reference
+from measure_accuracy import apart
 
 from compressor.cases.case import Case
 from compressor.cases.groups import METHODS
@@ -22,11 +23,6 @@ SOME = [("big_end", 0.3), ("small_end", 0.2), ("both", 0.1)]  # of the paper's f
 
 def run(joint, clearance, **solve):
     return simulate(Case.from_values({"joint": joint, "clearance_mm": clearance, "solve": solve}))
-
-
-def apart(one, other):
-    """Relative L2 difference of two accelerations."""
-    return np.linalg.norm(one - other) / np.linalg.norm(other)
 
 
 def residual_bound(found, revolutions=4):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from measure_accuracy import settled
 from random_cases import strangers
 
 from compressor.cases.case import Case
@@ -41,11 +42,6 @@ def asked(monkeypatch):
         run_module, "integrate", lambda request: rtols.append(request.rtol) or original(request)
     )
     return rtols
-
-
-def settled(found):
-    """Acceleration after settling."""
-    return found["acceleration"].values[found["time"].values >= found.attrs["settle"]]
 
 
 # The promise of a word

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from conftest import CHAOTIC
+from test_regime import PAPER, case
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
@@ -14,7 +15,6 @@ from compressor.solve.request import revolutions
 from compressor.solve.search import MEASURED_REV, agree, steady
 from compressor.solve.simulate import measure
 
-PAPER = {"joint": "big_end", "clearance_mm": 0.2}
 AUTO = {"settle_rev": "auto", "duration_rev": "auto"}
 SLOW = {  # takes revolutions to settle: little damping and friction
     "joint": "big_end",
@@ -22,10 +22,6 @@ SLOW = {  # takes revolutions to settle: little damping and friction
     "load": "none",
     "contact": {"damping_N_s_per_mm": 30},
 }
-
-
-def case(values=PAPER, **solve):
-    return Case.from_values({**values, "solve": solve, "output": {"keep": "metrics"}})
 
 
 def turn(**more):
