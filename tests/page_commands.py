@@ -40,15 +40,10 @@ def alike(want: str, line: str) -> bool:
     numbers = [[float(n) for n in NUMBER.findall(text)] for text in (want, line)]
     after = [text.split("±")[1:] for text in (want, line)]
     bars = {float(n) for texts in after for text in texts for n in NUMBER.findall(text)[:1]}
-    return all(
-        math.isclose(a, b, rel_tol=CLOSE) or (a in bars and b in bars) or small(a, b)
+    return all(  # or nothing but a bound: a share below a millionth of a per cent
+        math.isclose(a, b, rel_tol=CLOSE) or (a in bars and b in bars) or max(abs(a), abs(b)) < 1e-5
         for a, b in zip(*numbers, strict=True)
     )
-
-
-def small(one: float, other: float) -> bool:
-    """Whether numbers are nothing but a bound: a share below a millionth of a per cent."""
-    return max(abs(one), abs(other)) < 1e-5
 
 
 def run_command(place, command: str, *more: str) -> str:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from compressor.digits import align_columns, by_bar, is_known
+from compressor.digits import align_columns, by_bar
 
 INF, NAN = math.inf, math.nan
 
@@ -21,6 +21,7 @@ INF, NAN = math.inf, math.nan
         (1.23456e-5, 3e-8, "(1.235 ± 0.003)e-05"),
         (82345678.9, 12340.0, "(8.2346 ± 0.0013)e+07"),
         (12.0, 0.0, "12"),
+        (0.0, 0.0, "0"),
         (647.09123, NAN, "647.091"),
         (NAN, 1.0, "–"),
         (0.5, 0.6, "unknown"),
@@ -67,15 +68,6 @@ def test_no_more_digits_are_shown_than_double_precision_vouches_for():
     assert by_bar(math.pi, 1e-9, bare=True) == "3.14159"
     assert by_bar(1234.5678, 1.3, digits=4) == "1235 ± 2"  # 1.3 is not shown as 1
     assert by_bar(82345678.9, 12340.0, digits=4) == "(8.235 ± 0.002)e+07"
-
-
-def test_what_is_known_is_larger_than_its_bar():
-    assert is_known(2.0, 1.0)
-    assert is_known(0.0, 0.0)
-    assert is_known(0.0, 0.1, relative=False)
-    for value, bar in ((1.0, 1.0), (1.0, INF), (1.0, NAN), (NAN, 0.1)):
-        assert not is_known(value, bar)
-    assert not is_known(0.0, INF, relative=False)
 
 
 def test_columns_are_as_wide_as_what_stands_in_them():

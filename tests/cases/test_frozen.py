@@ -85,12 +85,8 @@ def test_templates_run(name):
         assert run["peak_acceleration"] > 0
 
 
-def write_kept():
+if __name__ == "__main__":
     cases = [json.dumps([values, Case.resolve(values).key]) for values, _ in FROZEN["cases"]]
     files = [f'"{path.name}": {json.dumps(kept_of(few_of(path)))}' for path in sorted(FILES)]
     text = '{"cases": [\n%s\n],\n"files": {\n%s\n}}\n'
     KEPT.write_text(text % (",\n".join(cases), ",\n".join(files)), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    write_kept()

@@ -62,11 +62,6 @@ def settings(values, before=""):
             yield f"{before}{key}={json.dumps(value, ensure_ascii=False)}"
 
 
-def marked(values):
-    """Whether an editor marks a file of these values."""
-    return values is not None and not SCHEMA.is_valid(values)
-
-
 def row(text, folder):
     """A row of the table as the program answers now."""
     lines, ways = told(text, folder), []
@@ -76,7 +71,7 @@ def row(text, folder):
             ways.append("values")
         if without_places(told("{}", folder, [*settings(values)])) == without_places(lines):
             ways.append("set")
-    if marked(values):
+    if values is not None and not SCHEMA.is_valid(values):  # an editor marks it
         ways.append("schema")
     return [text, lines, ways]
 
@@ -87,11 +82,7 @@ def test_a_mistake_is_answered_with_place_key_and_remedy(expected, tmp_path):
     assert all(line.isprintable() for line in expected[1])  # nothing that steers a terminal
 
 
-def write_table(texts):
-    with tempfile.TemporaryDirectory() as folder:
-        rows = [json.dumps(row(text, folder), ensure_ascii=False) for text in texts]
-    TABLE.write_text("[\n" + ",\n".join(rows) + "\n]\n", encoding="utf-8")
-
-
 if __name__ == "__main__":
-    write_table([text for text, *_ in ROWS])
+    with tempfile.TemporaryDirectory() as folder:
+        rows = [json.dumps(row(text, folder), ensure_ascii=False) for text, *_ in ROWS]
+    TABLE.write_text("[\n" + ",\n".join(rows) + "\n]\n", encoding="utf-8")
