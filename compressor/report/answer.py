@@ -283,7 +283,7 @@ def judge_knock(
         if 0 < count < len(along) and not np.diff(hits).sum() > 1:
             end = along[int(np.argmax(hits))] if hits[-1] else along[count - 1]
             words += f", from {names[end]} on" if hits[-1] else f", up to {names[end]}"
-        words += f"; {unsure} may" if unsure else ""
+        words += f", {unsure} may" if unsure else ""
     return replace(found, change=words, rank=float((values - bars)[known].max()), first=True)
 
 

@@ -41,7 +41,9 @@ def find_inputs(stored: Stored, study: StoredStudy) -> list[tuple[str, Lines]]:
     assumed = {
         key: spell_over_jobs(key, value, cases)
         for key, value in fixed.items()
-        if key not in given and key.partition(".")[0] not in NOT_ASSUMED and reads(cases[0], key)
+        if key not in given
+        and key.partition(".")[0] not in NOT_ASSUMED
+        and any(reads(case, key) for case in cases)
     }
     axes = {axis.key: [*dict.fromkeys(axis.values)] for axis in study.axes}
     return [
@@ -73,7 +75,8 @@ def spell_over_jobs(key: str, value: Any, cases: Sequence[Case]) -> Any:
     """Return a value; where it follows from a swept one, the least and the greatest as text."""
     if not isinstance(value, int | float):
         return value
-    ends = [value, *(value_of(case, key) for case in cases if reads(case, key))]
+    others = (value_of(case, key) for case in cases if reads(case, key))
+    ends = [value, *(one for one in others if one is not None)]  # of a group that some have
     low, high = min(ends), max(ends)
     return value if low == high else f"{spelt(low, '')} to {spelt(high, unit_of(key))}"
 

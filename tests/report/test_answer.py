@@ -129,11 +129,11 @@ def knocking(knock, error, mean=None, regime="periodic", turns=20):
     ("knocks", "change"),
     [
         (([0.1, 0.24, 0.4, 0.7], [0.01, 0.02, 0.01, 0.01]),
-         "2 of 4 jobs knock, from clearance 0.3 mm on; 1 may"),
+         "2 of 4 jobs knock, from clearance 0.3 mm on, 1 may"),
         (([0.7, 0.24, 0.1], [0.0, np.nan, 0.0]), "1 of 3 jobs knocks, up to clearance 0.1 mm"),
         (([0.7, 0.1, 0.7], [0.0] * 3), "2 of 3 jobs knock"),
         (([0.3, 0.4], [0.01, 0.01]), "2 of 2 jobs knock"),
-        (([0.3, 0.4], [0.1, 0.2]), "none of 2 jobs knocks; 2 may"),
+        (([0.3, 0.4], [0.1, 0.2]), "none of 2 jobs knocks, 2 may"),
         (([0.3], [0.01]), "it knocks"),
         (([0.3], [0.1]), "it may knock"),
         (([0.3], [np.inf]), "it may knock"),

@@ -374,6 +374,8 @@ def test_a_study_says_what_was_given_swept_and_assumed(own, tmp_path, monkeypatc
         assert (words in given, words in assumed) == (False, True)
     assert "rod mass" not in assumed
     assert "viscosity" not in assumed  # there is no oil
+    some = [Case.from_values({"body": {"mass_kg": mass}}) for mass in (2000, 3000)] + [Case()]
+    assert inputs.spell_over_jobs("body.mass_kg", 2000.0, some) == "2000 to 3000 kg"
 
 
 def test_studies_are_chosen_and_trials_come_last(own, tmp_path, compsim):

@@ -100,5 +100,5 @@ def spell(values: ArrayLike, unit: str = "", units: Units = "usual") -> str:
 
 def spell_span(values: np.ndarray, unit: str, units: Units) -> str:
     """Return the least and the greatest of some values, with their unit, as `spell`."""
-    _, factor = unit_in(unit, units)
-    return f"{spell(factor * values.min())} to {spell(values.max(), unit, units)}"
+    low, high = (spell(end, unit, units) for end in (values.min(), values.max()))
+    return f"{low.partition(' ')[0]} to {high}"
