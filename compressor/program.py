@@ -58,19 +58,28 @@ def report_progress(things: Sequence[Thing], progress: Progress) -> Iterator[Thi
     progress(len(things), len(things), "")
 
 
+def can_copy() -> bool:
+    """Return whether a copy of this process may work beside it.
+
+    Not with one core, beside threads, whose locks it would take along, in a process that may have
+    no children, and where the system makes no copies.
+    """
+    affinity = getattr(os, "sched_getaffinity", None)
+    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
+    is_free = threading.active_count() == 1 and not multiprocessing.current_process().daemon
+    return cores > 1 and is_free and "fork" in multiprocessing.get_all_start_methods()
+
+
 @contextlib.contextmanager
 def work_beside(work: Callable[[], Thing]) -> Iterator[Callable[[], Thing]]:
     """Have a copy of this process do some work meanwhile; yield what waits for its result.
 
-    All is done here where that is called if there is one core, threads run, whose locks a copy
-    would take along, the system makes no copies, or the copy dies. What work raises is raised here.
+    All is done here, where that is called, without `can_copy` and where the copy dies. What work
+    raises is raised here.
     """
-    affinity = getattr(os, "sched_getaffinity", None)
-    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
-    is_free = cores > 1 and threading.active_count() == 1
     here, there = multiprocessing.Pipe(duplex=False)
     copy = None
-    if is_free and "fork" in multiprocessing.get_all_start_methods():
+    if can_copy():
         with contextlib.suppress(OSError):  # too many processes
             copy = multiprocessing.get_context("fork").Process(
                 target=_send_result, args=(work, here, there)

@@ -51,9 +51,11 @@ set_keys = click.option(
 )
 
 
-def join_conditions(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) -> str:
-    """Return the condition under which all of some hold; "" of none."""
-    return " and ".join(f"({text})" for text in texts) if texts[1:] else "".join(texts)
+def take_one(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) -> str:
+    """Return the one condition; "" of none. Raises BadParameter of several."""
+    if texts[1:]:
+        raise click.BadParameter("is given twice: join the conditions by `and`")
+    return "".join(texts)
 
 
 def read_shard(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
@@ -70,7 +72,7 @@ only = click.option(
     "--only",
     type=TEXT,
     multiple=True,
-    callback=join_conditions,
+    callback=take_one,
     metavar="COMPARISON",
     help="Take only jobs with this, as 'clearance_mm < 0.2'.",
 )

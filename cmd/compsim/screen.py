@@ -115,6 +115,7 @@ def wrap_value(line: str) -> list[str]:
 def point_text(point: Mapping[str, Any]) -> str:
     """Return a job's swept values, each behind a blank: ` clearance_mm=0.2`."""
     texts = {key: setting(it) if isinstance(it, float) else it for key, it in point.items()}
+    texts |= {key: str(it).lower() for key, it in point.items() if isinstance(it, bool)}
     return "".join(f" {key}={text}" for key, text in texts.items())
 
 

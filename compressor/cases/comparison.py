@@ -5,8 +5,8 @@
 They select jobs (`--only`, `exclude`), and say under which condition a case reads a key. Python's
 parser reads a text into a tree; only comparisons may be in it, and nothing is ever run. Values mean
 what they mean in a case file: `true` is a boolean and `none` a word. Numbers are compared by size,
-words only with `==` and `!=`; a number of six digits or more equals what is rounded to it, as the
-program prints values. A key that has no value differs from every value.
+words only with `==` and `!=`. Numbers are equal that are printed alike, in six digits: what `plan`
+prints can be copied. A key that has no value differs from every value.
 """
 
 import ast
@@ -19,7 +19,9 @@ from typing import Any
 
 from compressor.cases.checks import getter, row_of, suggestion
 from compressor.cases.parameter import quote_value
+from compressor.cases.table import GROUPS
 from compressor.cases.yaml_reader import resolve_scalar
+from compressor.digits import setting
 from compressor.program import ignore_warnings
 
 MAX_LENGTH = 1000  # characters
@@ -30,7 +32,6 @@ SIGNS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
     ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le,
     ast.Gt: operator.gt, ast.GtE: operator.ge,
 }  # fmt: skip
-ROUNDED_DIGITS = 6  # of a number that may be a job's as the program prints it, rounded
 SUCH_AS = "write such as clearance_mm > 0.2 and load == gas"
 
 Value = Callable[[str], Any]  # a key -> a job's value, or None
@@ -110,6 +111,8 @@ def _parts(node: Any) -> tuple[str, Any, str]:
 def _compare_job(key: str, sign: Any, text: str) -> Test:
     """Return the test of one comparison with a value of a key in the table."""
     row, wanted = row_of(key), resolve_scalar(text)
+    if key in GROUPS:
+        raise NoComparison(f"{key} is a group: compare one of its keys")
     if row is None:
         raise NoComparison(f"unknown key {quote_value(key)}{suggestion(key, '')}")
     if row.kind in ("materials", "text", "card"):
@@ -123,15 +126,15 @@ def _compare_job(key: str, sign: Any, text: str) -> Test:
         raise NoComparison(f"{key} needs {'a number' if row.is_number else row.needed}, not {text}")
     if isinstance(wanted, str) and sign not in (operator.eq, operator.ne):
         raise NoComparison(f"{wanted} is a word: compare it by == or !=")
-    digits = len(re.sub(r"e.*|^[-+]?[0.]*|[.]", "", text.lower()))
-    if sign in (operator.eq, operator.ne) and row.is_number and digits >= ROUNDED_DIGITS:
-        return lambda value: bool(sign(round_number(value(key), digits), wanted))
+    if sign in (operator.eq, operator.ne) and not isinstance(wanted, str) and row.is_number:
+        printed = setting(wanted)
+        return lambda value: bool(sign(print_number(value(key)), printed))
     return _compare(lambda value: value(key), sign, wanted)
 
 
-def round_number(value: Any, digits: int) -> Any:
-    """Return a number in so many digits, as it may be printed; a word, or no value, as it is."""
-    return float(f"{value:.{digits}g}") if isinstance(value, int | float) else value
+def print_number(value: Any) -> Any:
+    """Return a number as the program prints it; a word, or no value, as it is."""
+    return setting(value) if isinstance(value, int | float) else value
 
 
 def _compare(get: Callable[[Any], Any], sign: Any, wanted: Any) -> Callable[[Any], bool]:

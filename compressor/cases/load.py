@@ -7,7 +7,7 @@ whole, for its key and for what is wrong with its values, and again when it is u
 
 import itertools
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import partial
@@ -37,7 +37,7 @@ from compressor.cases.yaml_reader import (
     read_file,
     shorten,
 )
-from compressor.program import Progress, no_progress, work_beside
+from compressor.program import Progress, can_copy, no_progress, work_beside
 
 MAX_JOBS = 10_000
 NONE_SELECTED = "selects no job; compsim plan without it lists those that there are"
@@ -253,7 +253,8 @@ def _find_idle_exclusions(blocks: Sequence[Block]) -> Iterator[Problem]:
     for block in blocks:
         for number in range(len(block.exclusions)):
             place = block.tree.at("exclude", number)[1]
-            idle[place] = idle.get(place, True) and number in block.left_and_idle[1]
+            is_idle = number in block.left_and_idle[1] and not draws(block)  # there by chance
+            idle[place] = idle.get(place, True) and is_idle
     for place in (place for place, is_idle in idle.items() if is_idle):
         yield Problem("exclude", IDLE, place)
 
@@ -314,10 +315,11 @@ def _columns(blocks: Sequence[Block]) -> list[str]:
 
 
 class CheckedCases(NamedTuple):
-    """What checks of some cases have found; `keys` of the rest end where one is wrong.
+    """What checks of some cases have found.
 
-    `values`: of each swept key. `selected`: numbers of the cases to be run. `misfits` are told
-    behind what is `wrong` alone, from which some follow.
+    `values`: of each swept key. `selected`: numbers of the cases to be run. Where anything is
+    wrong, these and the `keys` lack later cases. `misfits` are told behind what is `wrong` alone,
+    from which some follow.
     """
 
     keys: list[str]
@@ -335,16 +337,19 @@ def _check_cases(
     Of many cases a copy of this process checks one half. Raises CaseFileError.
     """
     total, check = len(cases), partial(_check_some, cases, columns, only)
-    if total < MANY_CASES:
-        parts = [check(range(total))]
+    is_large, remark = total >= MANY_CASES, f"{file.name}: {total} jobs"
+    progress = progress if is_large else no_progress
+    if not is_large or not can_copy():
+        progress(0, total, remark)
+        parts = [check(range(total), progress)]
     else:
         for block in cases.blocks:
             block.mark_cards()
         half = total // 2
         with work_beside(lambda: check(range(half, total))) as others:
-            progress(0, total, f"{file.name}: {total} jobs")
-            parts = [check(range(half), lambda done: progress(2 * done, total, "")), others()]
-        progress(total, total, "")
+            progress(0, total, remark)  # after which a thread may draw it
+            parts = [check(range(half), lambda done, *_: progress(2 * done, total, "")), others()]
+    progress(total, total, "")
     wrong: Located = {}
     for located in (*(part.wrong for part in parts), *(part.misfits for part in parts)):
         for where, problem in located.items():
@@ -365,13 +370,13 @@ def _check_some(
     columns: Sequence[str],
     only: Test | None,
     numbers: range,
-    progress: Callable[[int], object] = int,
+    progress: Progress = no_progress,
 ) -> CheckedCases:
-    """Return what the checks of cases of some numbers find; progress: called with how many."""
+    """Return what the checks of cases of some numbers find."""
     found = CheckedCases([], {key: [] for key in columns}, [], {}, {})
     for number in numbers:
         if number % 1000 == 0:
-            progress(number - numbers.start)
+            progress(number - numbers.start, len(numbers), "")
         block, place = cases.place_of(number)
         try:
             case = block.case(place)
@@ -400,7 +405,9 @@ def axis_value(case: Case, block: Block, place: int, key: str) -> Any:
     What a case writes as without the key the values of its place in the block alone have.
     """
     own = value_of(case, key)
-    return value_of(block.given_of(place), key) if own is None and reads(case, key) else own
+    if own is not None or not row_of(key) or not reads(case, key):
+        return own
+    return value_of(block.given_of(place), key)
 
 
 Where = tuple[Place, str]  # a key of a file, which may be given for several blocks or files

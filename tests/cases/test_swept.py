@@ -128,6 +128,8 @@ def test_of_what_is_drawn_some_may_be_excluded(read):
     every, slow = (rows(read(SAMPLED % ("lhs", "lhs") + more))
                    for more in ("", "exclude: machine.speed_rpm > 700"))  # fmt: skip
     assert slow == [row for row in every if row[1] <= 700]
+    by_chance = SAMPLED % ("lhs", "lhs") + "exclude: machine.speed_rpm > 899.99"
+    assert rows(read(by_chance)) == every
 
 
 @pytest.mark.parametrize("kind", ["random", "lhs", "sobol"])
@@ -207,6 +209,11 @@ def test_what_has_no_case_is_not_left_out_by_what_a_case_would_fill_in(read):
     text = "machine: {crank_radius_mm: [100, 700]}\nload: none\n"
     (message,) = refused(read, text + "exclude: machine.rod_inertia_kg_m2 > 1\n")
     assert "must be shorter than the rod" in message
+
+
+def test_a_misspelt_key_of_a_later_block_is_told(read):
+    text = ONE + "clearance_mm: 0.1\nblocks: [{}, {machine: {rod_mas_kg: [1, 2]}}]\n"
+    assert "did you mean machine.rod_mass_kg?" in refused(read, text)[0]
 
 
 def test_blocks_stand_one_after_the_other(read):
