@@ -185,7 +185,7 @@ def publish_batch(folder: Folder, data: bytes, written: str = "") -> Path:
         publish(path, data, make=False)  # one made anew would lack what the run has stored before
     except StoreError as error:
         if isinstance(error.__cause__, FileNotFoundError | NotADirectoryError):
-            raise FolderLost(folder, FolderLost.PROBLEM, FolderLost.REMEDY) from error
+            raise FolderLost(folder) from error
         raise
     return path
 

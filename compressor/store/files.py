@@ -68,8 +68,9 @@ class WrongName(StoreError):
 class FolderLost(StoreError):
     """A folder of results that was removed or replaced while a run wrote to it."""
 
-    PROBLEM = "was removed or replaced, at least in part, while the run wrote to it"
-    REMEDY = "run the same command again, in a folder that stays"
+    def __init__(self, folder: Folder):
+        problem = "was removed or replaced, at least in part, while the run wrote to it"
+        super().__init__(folder, problem, "run the same command again, in a folder that stays")
 
 
 class StoreWarning(CompsimWarning):

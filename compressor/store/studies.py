@@ -201,7 +201,7 @@ def read_studies(folder: Folder) -> list[StoredStudy]:
     if not found:
         raise damaged[0]
     for damage in damaged:
-        warnings.warn(f"{damage}: it is left out", StoreWarning, stacklevel=3)
+        warnings.warn(f"left out: {damage}", StoreWarning, stacklevel=3)
     return found
 
 
@@ -230,7 +230,7 @@ def read_study(path: Path) -> StoredStudy:
         raise system_error(path, error) from error
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         problem = "is damaged, or of another version of compsim"
-        raise DamagedFile(path, problem, "delete it and run its case file again") from error
+        raise DamagedFile(path, problem, "run its case file again") from error
     return study
 
 

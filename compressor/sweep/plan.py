@@ -19,7 +19,7 @@ from compressor.sweep.warm_up import compile_once, compile_seconds, needed_parts
 from compressor.sweep.worker import attempt
 
 ROW_BYTES = 700  # of one job in a merged batch without time series
-MAX_CASES = 1_000  # missing jobs that are looked at for what is to be compiled, drawn evenly
+MAX_SAMPLED = 1_000  # missing jobs that are looked at for what is to be compiled, drawn evenly
 START_SECONDS = 2.0  # of wall time until workers have loaded the equations, on an idle machine
 LONG_JOB = 10.0  # s of a job that is not run twice for what loading was in it
 
@@ -105,7 +105,7 @@ def add_times(
         return counts
     keys = {share.study: jobs_of(share.study, missing) for share in counts.studies}
     timed = {study: missing[mine[len(mine) // 2]] for study, mine in keys.items() if mine}
-    some = random.Random(0).sample([*missing.places], min(MAX_CASES, len(missing)))
+    some = random.Random(0).sample([*missing.places], min(MAX_SAMPLED, len(missing)))
     parts = needed_parts([*timed.values(), *(missing[key] for key in some)])
     compiling = compile_seconds(parts, min(workers, cores()))
     compile_once(parts, remark, workers)

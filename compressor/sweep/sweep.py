@@ -112,7 +112,7 @@ def sweep(
         held = merge_batches(folder)
         files = (folder / "studies" / f"{study.name}.json" for study in studies)
         if not (ends.keys() <= held and all(file.exists() for file in files)):
-            raise FolderLost(folder, FolderLost.PROBLEM, FolderLost.REMEDY)
+            raise FolderLost(folder)
     counts = {study.name: len(study.selected) for study in studies}
     failures, seconds = list_failures(studies, ends), time.monotonic() - began
     return Summary(len(wanted) - len(missing), len(missing), counts, failures, seconds)

@@ -42,7 +42,7 @@ def test_one_job_of_each_study_tells_the_time_of_all(studies, monkeypatch):
 def test_all_is_compiled_that_a_timed_job_needs(studies, monkeypatch):
     """Else its time would be that of compiling; of many jobs only some are looked at."""
     timed_as(monkeypatch, lambda case: 1.0)
-    monkeypatch.setattr(plan, "MAX_CASES", 1)
+    monkeypatch.setattr(plan, "MAX_SAMPLED", 1)
     compiled = []
     monkeypatch.setattr(plan, "compile_once", lambda parts, *_: compiled.append(parts))
     oiled = {"joint": "both", "clearance_mm": 0.1, "lubricant": True}
