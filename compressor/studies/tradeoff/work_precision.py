@@ -103,11 +103,13 @@ def tabulate(rows: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     order["rtol"].sort(reverse=True)
     last = {tuple(row[dim] for dim in dims): row for row in rows}.values()
     columns: dict[str, tuple] = {dim: ("row", [row[dim] for row in last]) for dim in dims}
+    blanks = {name: "" if name in WORDS else math.nan for name in VARIABLES}
     for name, attrs in VARIABLES.items():
-        kind, blank = (object, "") if name in WORDS else (float, math.nan)
-        columns[name] = "row", np.array([row.get(name, blank) for row in last], kind), attrs
+        kind = object if name in WORDS else float
+        values = np.array([row.get(name, blanks[name]) for row in last], kind)
+        columns[name] = "row", values, attrs
     table = xr.Dataset(columns).set_index(row=[*dims])
-    found = table.unstack("row", fill_value=dict.fromkeys(WORDS, "")).reindex(order)
+    found = table.unstack("row", fill_value=blanks).reindex(order)
     found["reference_uncertainty"] = found["reference_uncertainty"].max(dims[1:], keep_attrs=True)
     return found
 
