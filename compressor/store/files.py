@@ -66,10 +66,10 @@ class WrongName(StoreError):
 
 
 class FolderLost(StoreError):
-    """A folder of results that was removed or replaced while a run wrote to it."""
+    """A folder of results that was removed, replaced or damaged while a run wrote to it."""
 
     def __init__(self, folder: Folder):
-        problem = "was removed or replaced, at least in part, while the run wrote to it"
+        problem = "was removed, replaced or damaged, at least in part, while the run wrote to it"
         super().__init__(folder, problem, "run the same command again, in a folder that stays")
 
 

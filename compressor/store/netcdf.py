@@ -7,7 +7,7 @@ a disk fills up while it writes. Only this module imports h5py.
 """
 
 import contextlib
-import uuid
+import io
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,9 +51,8 @@ def encode_netcdf(
     for dims, array, _ in stored.values():
         sizes |= dict(zip(dims, array.shape, strict=True))
     numbers = {dim: number for number, dim in enumerate(sizes)}
-    # HDF5 knows open files by their names, also those in memory
-    with h5py.File(uuid.uuid4().hex, "w", driver="core", backing_store=False, libver="latest",
-                   track_order=True) as file:  # fmt: skip
+    image = io.BytesIO()
+    with h5py.File(image, "w", libver="latest", track_order=True) as file:
         for dim, size in sizes.items():
             dims, array, _ = stored.get(dim, ((), np.zeros(0), {}))
             is_coordinate = dims[:1] == (dim,)
@@ -72,8 +71,7 @@ def encode_netcdf(
                 _set_attribute(file[name], key, value)
         for key, value in attributes.items():
             _set_attribute(file, key, value)
-        file.flush()
-        return file.id.get_file_image()
+    return image.getvalue()
 
 
 def _as_stored(

@@ -156,7 +156,9 @@ def test_a_folder_that_is_lost_amid_a_run_is_an_error(lost, studies, tmp_path, i
             if lost == "batches":  # as another run may
                 make_batches(tmp_path / "out")
 
-    with pytest.raises(FolderLost, match=r"out: was removed or replaced.*again, in a folder that"):
+    with pytest.raises(
+        FolderLost, match=r"out: was removed, replaced or damaged.*again, in a folder that"
+    ):
         sweep(studies(one={"load": ["none", "spring"]}), tmp_path / "out", 1, clean)
     assert (tmp_path / "out" / lost).exists() == (lost == "batches")  # not made anew
 
