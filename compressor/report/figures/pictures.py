@@ -7,6 +7,7 @@ user's matplotlibrc nor a user's own figures are touched.
 import contextlib
 import io
 import itertools
+import os
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -17,6 +18,7 @@ import plotly.graph_objects as go
 from matplotlib import rc_context, rcParamsDefault
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
@@ -42,6 +44,7 @@ from compressor.report.figures.style import PIXEL
 
 DPI = 150
 EDGE = 0.1  # inches, around what is drawn
+MAX_SHARED = 2000  # figures that two processes share: their numbers fit in any pipe
 LEGEND_WIDTH = 130  # characters, in a row of a legend
 MARKERS = {
     "circle": "o", "square": "s", "diamond": "D", "triangle-up": "^", "triangle-down": "v",
@@ -96,7 +99,8 @@ def whole_box(painted: Figure, figure: go.Figure) -> Bbox:
              for axis, at, is_named in ((axes.yaxis, panel.x.domain[0], True),
                                         (axes.xaxis, panel.y.domain[0], panel.x.ticktext))
              if is_named and at < 1e-6]  # fmt: skip
-    found = [one.get_tightbbox() for one in (*painted.legends, *painted.texts, *outer)]
+    renderer = FigureCanvasAgg(painted).get_renderer()  # else each would make its own
+    found = [one.get_tightbbox(renderer) for one in (*painted.legends, *painted.texts, *outer)]
     return Bbox.union([painted.bbox, *filter(None, found)]).transformed(
         painted.dpi_scale_trans.inverted()
     )
@@ -110,11 +114,24 @@ def draw_all(work: Sequence[Callable[[], Made]]) -> list[Made]:
     with contextlib.suppress(OSError):
         sys.stderr.write(f"drawing {plural(len(work), 'figure')}\n" * bool(work))
         sys.stderr.flush()
-    drawn: list[Any] = [None] * len(work)
-    with work_beside(lambda: [draw() for draw in work[1::2]]) as others:
-        drawn[::2] = [draw() for draw in work[::2]]
-        drawn[1::2] = others()
-    return drawn
+    here, there = os.pipe()  # of numbers, of which each process takes one at a time
+    numbers = range(len(work))[:MAX_SHARED]
+    os.write(there, b"".join(number.to_bytes(2) for number in numbers[::-1]))
+    os.close(there)
+
+    def draw_some() -> dict[int, Made]:
+        return {number: work[number]() for number in map(int.from_bytes, iter(take, b""))}
+
+    def take() -> bytes:
+        return os.read(here, 2)
+
+    try:
+        with work_beside(draw_some) as others:
+            drawn = draw_some() | others()
+    finally:
+        os.close(here)
+    # a copy that died has drawn none
+    return [drawn[number] if number in drawn else draw() for number, draw in enumerate(work)]
 
 
 def paint(figure: go.Figure) -> Figure:
