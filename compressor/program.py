@@ -78,25 +78,28 @@ def work_beside(work: Callable[[], Thing]) -> Iterator[Callable[[], Thing]]:
     raises is raised here.
     """
     here, there = multiprocessing.Pipe(duplex=False)
-    copy = None
-    if can_copy():
-        with contextlib.suppress(OSError):  # too many processes
-            copy = multiprocessing.get_context("fork").Process(
-                target=_send_result, args=(work, here, there)
-            )
-            copy.start()
-    there.close()
 
     def result() -> Thing:
-        if copy:
-            with contextlib.suppress(EOFError, OSError):
-                return here.recv()
+        with contextlib.suppress(EOFError, OSError):
+            return here.recv()
         return work()
 
-    try:
+    copy = copy_beside(_send_result, work, here, there) if can_copy() else contextlib.nullcontext()
+    with here, copy:
+        there.close()
         yield result
+
+
+@contextlib.contextmanager
+def copy_beside(target: Callable[..., None], *args: Any) -> Iterator[None]:
+    """Have a copy of this process do something meanwhile, if there can be one; then kill it."""
+    copy = None
+    with contextlib.suppress(OSError, ValueError):  # too many processes; there are no copies
+        copy = multiprocessing.get_context("fork").Process(target=target, args=args)
+        copy.start()
+    try:
+        yield
     finally:
-        here.close()
         if copy and copy.pid:
             copy.kill()
             copy.join()

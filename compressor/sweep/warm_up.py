@@ -8,15 +8,14 @@ before a Ctrl-C is not compiled again.
 
 import contextlib
 import hashlib
-import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from compressor.cases import Case
-from compressor.program import COMPILED, library_versions, machine_code_folder
+from compressor.program import COMPILED, copy_beside, library_versions, machine_code_folder
 from compressor.store import StoreError
 from compressor.sweep.pool import cores
 from compressor.sweep.worker import settle
@@ -68,7 +67,8 @@ def uncompiled(parts: Iterable[Part]) -> list[Part]:
 def load(parts: Iterable[Part], beside: bool = False) -> None:
     """Load the equations, or compile them, by runs that are as short as can be.
 
-    beside: a copy of this process compiles a part of them meanwhile.
+    beside: a copy of this process compiles a part of them meanwhile. One that waits for a lock of a
+    thread that is not in it does no harm: all that it has not finished is compiled here.
     """
     from compressor.solve import measure  # needs numba: only where something is simulated
 
@@ -81,28 +81,9 @@ def load(parts: Iterable[Part], beside: bool = False) -> None:
         )
         for kind, method, body in parts
     ]
-    with parts_beside(cases[-1]) if beside else contextlib.nullcontext():
+    with copy_beside(compile_quietly, cases[-1]) if beside else contextlib.nullcontext():
         for case in cases:
             measure(case)
-
-
-@contextlib.contextmanager
-def parts_beside(case: Case) -> Iterator[None]:
-    """Have a copy of this process compile parts of the march of a case meanwhile.
-
-    Not where the system makes no copies. One that waits for a lock of a thread that is not in it
-    does no harm: all that it has not finished is compiled here, and then it is killed.
-    """
-    copy = None
-    with contextlib.suppress(OSError, ValueError):  # too many processes; there are no copies
-        copy = multiprocessing.get_context("fork").Process(target=compile_quietly, args=(case,))
-        copy.start()
-    try:
-        yield
-    finally:
-        if copy and copy.pid:
-            copy.kill()
-            copy.join()
 
 
 def compile_quietly(case: Case) -> None:
