@@ -1,6 +1,5 @@
 """The program: its version, its errors, the libraries it runs with, where its machine code is."""
 
-import atexit
 import contextlib
 import ctypes
 import functools
@@ -8,7 +7,6 @@ import gc
 import hashlib
 import multiprocessing
 import os
-import shutil
 import signal
 import sys
 import tempfile
@@ -140,6 +138,12 @@ class CompsimError(Exception):
     prefix = "compsim: "
 
 
+class NoFolder(CompsimError):
+    """Machine code can be kept nowhere."""
+
+    exit_code = 2
+
+
 class CompsimWarning(UserWarning):
     """What was requested and is missing; the program goes on without it.
 
@@ -204,35 +208,19 @@ def sources_hash(folder: Path) -> str:
 def machine_code_folder() -> Path:
     """Return the folder of machine code, named by a hash of the sources.
 
-    It is in NUMBA_CACHE_DIR, else beside the sources, else in the user's cache; where none of these
-    may be written, in a temporary folder of this process and its workers, with a CompsimWarning.
-    Numba itself would go on using a caller's old code after a change of what it calls in another
-    file.
+    It is in NUMBA_CACHE_DIR if that is set, else beside the sources, else in the user's cache.
+    Raises NoFolder where nothing can be written. Numba itself would go on using a caller's old code
+    after a change of what it calls in another file.
     """
-    return _machine_code_base() / f"numba-{sources_hash(COMPILED)}"
-
-
-def _machine_code_base() -> Path:
     named = os.environ.get(CODE_VARIABLE)
-    if named and _can_write(place := Path(named) / "compsim"):
-        return place
-    if named:
-        del os.environ[CODE_VARIABLE]  # also for workers
-        text = f"nothing can be written to {named} ({CODE_VARIABLE}): another folder is used"
-        warnings.warn(text, CompsimWarning, stacklevel=2)
-    users = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # as it is, homeless
-    for place in (COMPILED / "__pycache__", Path(users) / "compsim"):
+    cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # as it is, homeless
+    usual = (COMPILED / "__pycache__", Path(cache) / "compsim")
+    for place in (Path(named).absolute() / "compsim",) if named else usual:
         if place.is_absolute() and _can_write(place):
-            return place
-    place = Path(tempfile.mkdtemp(prefix="compsim-"))
-    os.environ[CODE_VARIABLE] = str(place)  # read by workers, too
-    atexit.register(shutil.rmtree, place, ignore_errors=True)
-    text = (
-        f"nothing may be written beside {COMPILED} or in the user's cache: the equations are "
-        f"compiled into {place}, and again next time; set {CODE_VARIABLE} to a folder that stays"
-    )
-    warnings.warn(text, CompsimWarning, stacklevel=2)
-    return place / "compsim"
+            return place / f"numba-{sources_hash(COMPILED)}"
+    where = named or f"beside {COMPILED} or in the user's cache"
+    text = f"nothing can be written to {where}, where machine code would be kept"
+    raise NoFolder(f"{text}: set {CODE_VARIABLE} to a folder that stays")
 
 
 @functools.cache

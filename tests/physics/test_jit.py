@@ -68,14 +68,10 @@ def test_machine_code_belongs_to_its_sources(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("kind", ["file", "proc"])
-def test_a_named_folder_that_takes_no_file_is_replaced_with_a_remark(kind, tmp_path, monkeypatch):
+def test_a_named_folder_that_takes_no_file_is_refused(kind, tmp_path, monkeypatch):
     named = Path("/proc") if kind == "proc" else tmp_path / "named"
     if kind == "file":
         named.write_text("")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(named))
-    with pytest.warns(
-        program.CompsimWarning, match=rf"{named} \(NUMBA_CACHE_DIR\): another folder"
-    ):
-        found = program.machine_code_folder()
-    assert found.parent == program.COMPILED / "__pycache__"
-    assert program.machine_code_folder() == found  # without a remark, also in workers
+    with pytest.raises(program.NoFolder, match=f"to {named}, .*: set NUMBA_CACHE_DIR to a folder"):
+        program.machine_code_folder()
