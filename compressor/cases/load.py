@@ -7,7 +7,7 @@ whole, for its key and for what is wrong with its values, and again when it is u
 
 import itertools
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import partial
@@ -110,14 +110,14 @@ def load_studies(
         else:
             studies.append(study)
             blocks += found
-    unread = _find_unread(blocks)
-    if changes.values and any(place.line for place, _ in unread):
-        # what the command line takes the reader from is the file's, and no mistake of it
+    unused = _find_unused(blocks)
+    if changes.values and any(place.line for place, _ in unused):
+        # what the command line takes the use from is the file's, and no mistake of it
         alone = {(one.place, one.key) for one in _find_problems(paths, max_jobs)}
-        unread = {
-            at: one for at, one in unread.items() if not at[0].line or (one.place, one.key) in alone
+        unused = {
+            at: one for at, one in unused.items() if not at[0].line or (one.place, one.key) in alone
         }
-    problems += unread.values()
+    problems += unused.values()
     if not problems and not any(study.selected for study in studies):
         problems.append(Problem("", NONE_SELECTED, selection))
     if problems:
@@ -190,13 +190,6 @@ def _study(
     columns = [*blocks[0].columns] if is_grid else _columns(blocks)
     swept = [] if is_grid else columns
     keys, values, selected = _check_cases(file, cases, swept, only, progress)
-    if not file.changes.values and (idle := [*_find_idle_exclusions(blocks)]):
-        raise CaseFileError(idle)  # what the command line sets may have taken what they leave out
-    sampled = next((block.tree for block in blocks if "sample" in block.tree.values), None)
-    if sampled and file.tree and not any(map(draws, blocks)):
-        alone = _block_trees(file.tree, NO_CHANGES, max_jobs)[0]  # of which --set may leave nothing
-        if not any(draws(plan_block(tree, file.name)[0]) for tree in alone):
-            raise CaseFileError([sampled.problem(("sample",), NO_DRAWS, True)])
     cases.keys = keys
     values = dict(blocks[0].columns) if is_grid else values
     for key, sweep in blocks[0].sweeps.items() if is_grid else ():
@@ -245,18 +238,6 @@ def _blocks(file: CaseFile, max_jobs: int) -> list[Block]:
     told |= {one.key for one in problems}  # from which more may follow
     left = [one for one in found.values() if not any(covers(one.key, key) for key in told)]
     raise CaseFileError(problems + left)
-
-
-def _find_idle_exclusions(blocks: Sequence[Block]) -> Iterator[Problem]:
-    """Yield the conditions of `exclude` that leave out no job of any block they are for."""
-    idle: dict[Place, bool] = {}
-    for block in blocks:
-        for number in range(len(block.exclusions)):
-            place = block.tree.at("exclude", number)[1]
-            is_idle = number in block.left_and_idle[1] and not draws(block)  # there by chance
-            idle[place] = idle.get(place, True) and is_idle
-    for place in (place for place, is_idle in idle.items() if is_idle):
-        yield Problem("exclude", IDLE, place)
 
 
 def _block_trees(tree: Tree, changes: Tree, max_jobs: int) -> tuple[list[Tree], list[Problem]]:
@@ -410,9 +391,6 @@ def axis_value(case: Case, block: Block, place: int, key: str) -> Any:
     return value_of(block.given_of(place), key)
 
 
-Where = tuple[Place, str]  # a key of a file, which may be given for several blocks or files
-
-
 def _find_problems(paths: Sequence[str | os.PathLike[str]], max_jobs: int) -> list[Problem]:
     """Return what is wrong with files without the command line."""
     try:
@@ -422,21 +400,31 @@ def _find_problems(paths: Sequence[str | os.PathLike[str]], max_jobs: int) -> li
     return []
 
 
-def _find_unread(blocks: Sequence[Block]) -> dict[Where, Problem]:
-    """Return the keys that no job reads of those that they are given for.
+def _find_unused(blocks: Sequence[Block]) -> Located:
+    """Return what is of no use in any job that it is given for.
 
-    Cases are built only until each key has a reader.
+    Such are keys that none reads, conditions that leave out none, and a `sample` of nothing. Cases
+    are built only until each key has a reader.
     """
-    read: set[Where] = set()
-    unread: dict[Where, Problem] = {}
+    used: set[tuple[Place, str]] = set()
+    unused: Located = {}
     for block in blocks:
-        tree, wanted = block.tree, {}
+        tree, wanted, is_drawn = block.tree, {}, draws(block)
+        for number in range(len(block.exclusions)):
+            where = tree.at("exclude", number)[1], "exclude"
+            unused[where] = Problem("exclude", IDLE, where[0])
+            if is_drawn or number not in block.left_and_idle[1]:  # where drawn, it is by chance
+                used.add(where)
+        if "sample" in tree.values:
+            where = tree.at("sample")[0], "sample"
+            unused[where] = Problem("sample", NO_DRAWS, where[0])
+            used |= {where} if is_drawn else set()
         for key, value in block.given.items():
             path = path_of(key)
             while path not in tree.places:  # of a part, the key that gives all of them
                 path = path[:-1]
             where = tree.at(*path)[0], key_of(path)
-            if where not in read and (row_of(key) or key in WORDS) and not is_off(key, value):
+            if where not in used and (row_of(key) or key in WORDS) and not is_off(key, value):
                 is_swept = key in block.sweeps
                 wanted[where] = conditions(key) if is_swept else needs_of_given(key, block.given)
         for number in block.numbers if wanted else ():
@@ -444,13 +432,13 @@ def _find_unread(blocks: Sequence[Block]) -> dict[Where, Problem]:
             for where, needs in [*wanted.items()]:
                 unmet = next((one for one in needs if not condition(one[1])(case)), None)
                 if unmet is None:
-                    read.add(where)
+                    used.add(where)
                     del wanted[where]
-                elif where not in unread:
+                elif where not in unused:
                     problem = problem_of(*unmet)
                     at = tree.at(*path_of(problem.key))[0]
                     place = at if at.file == where[0].file else where[0]
-                    unread[where] = replace(problem, place=place)
+                    unused[where] = replace(problem, place=place)
             if not wanted:
                 break
-    return {where: problem for where, problem in unread.items() if where not in read}
+    return {where: problem for where, problem in unused.items() if where not in used}
