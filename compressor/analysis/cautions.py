@@ -324,7 +324,7 @@ def check_friction(case: Case) -> Remarks:
     if case.wear:
         yield "wear", "compsim wear alone reads it: a run has the clearances that are given"
     friction = case.friction
-    if friction and friction.law in (None, "lugre") and friction.static < friction.dynamic:
+    if friction and friction.law in ("adams", "lugre") and friction.static < friction.dynamic:
         text = f"{friction.static:g} is below the dynamic one, {friction.dynamic:g}"
         yield "friction.static", f"{text}: friction grows as bodies slide"
 

@@ -33,7 +33,7 @@ from compressor.cases.conflicts import (
     unread_values,
 )
 from compressor.cases.groups import Contact, Friction, Gas, Machine, Offset, Output, Solve, Spring
-from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
+from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS
 from compressor.cases.optional_groups import (
     Body,
     Drive,
@@ -68,6 +68,11 @@ SOUND = PerJoint(0.0, 0.0)  # a healthy clearance that no case need name
 FOLLOWING = ("gas.switching", "gas.back_pressure_MPa")  # from what else is given of a cylinder
 OWN_GAS = {key for key in (*table(), *parts_by_key()) if key.startswith("gas.")} - {*FOLLOWING}
 IN_KEY_IF_READ = {".".join(key.split(".")[:2]) for key in FACT_KEYS}
+# values that a job's key does not have, as it has none of what is not given
+AS_WITHOUT = {
+    "machine.counterweight_kg_mm": 0.0, "contact.geometry": "external", "friction.law": "adams",
+    "friction.ideal_joints": False,
+}  # fmt: skip
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
 KEY_TEXT = json.JSONEncoder(sort_keys=True, separators=(",", ":"), check_circular=False)
 # the groups with a key that results depend on; of `solve` the span and the solver are parts
@@ -356,7 +361,8 @@ stroke, 240 mm
     def chooses_forces(self) -> bool:
         """Return whether it has laws, a film or a load that runs by default do not have."""
         measured = self.load == "gas" and self.gas.is_measured
-        own_law = self.contact.law != CONTACT_LAWS[0] or (self.friction and self.friction.law)
+        own_law = self.contact.law != CONTACT_LAWS[0]
+        own_law |= self.friction is not None and self.friction.law != FRICTION_LAWS[0]
         return measured or (self.joint != "none" and bool(own_law or self.lubricant))
 
     @property
@@ -479,7 +485,8 @@ def _text_of_group(name: str, group: Any) -> str:
     given = {
         key: vars(value) if isinstance(value, BY_PART) else value
         for key, value in vars(group).items()
-        if value is not None and f"{name}.{key}" not in IN_KEY_IF_READ
+        if value not in (None, AS_WITHOUT.get(path := f"{name}.{key}"))
+        and path not in IN_KEY_IF_READ
     }
     if cards := given.get("indicator"):  # the digest counts, wherever the file is
         given["indicator"] = {end: card and card.rpartition("@")[2] for end, card in cards.items()}
@@ -489,7 +496,8 @@ def _text_of_group(name: str, group: Any) -> str:
 def _facts_read(case: Case) -> dict[str, Any]:
     """Return the facts that a case has and reads."""
     holds = tuple([test(case) for test in _fact_conditions().values()])
-    return {key: value for key, get in _facts_where(holds) if (value := get(case)) is not None}
+    found = {key: get(case) for key, get in _facts_where(holds)}
+    return {key: value for key, value in found.items() if value not in (None, AS_WITHOUT.get(key))}
 
 
 @cache
@@ -528,9 +536,6 @@ def _plain_value(group: Any) -> dict[str, Any] | bool:
         return False
     # `vars` has the fields in their order, since a group has nothing but fields
     plain = {key: _plain_parts(one) for key, one in vars(group).items() if one is not None}
-    if isinstance(group, Contact) and group.materials and group.law not in CYLINDRICAL:
-        # also the default: that of a file depends on whether it gives a pin radius
-        plain.setdefault("geometry", "external")
     if isinstance(group, Solve):
         if group.rtol is not None:
             del plain["accuracy"]

@@ -17,7 +17,7 @@ from compressor.cases.card import DRIVING, CardError, open_card, taken_work
 from compressor.cases.checks import TWICE, row_of, stands_for, value_of
 from compressor.cases.comparison import condition
 from compressor.cases.groups import CRANK_END, ENDS
-from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
+from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING
 from compressor.cases.optional_groups import MAX_RATIO, MIN_RATIO
 from compressor.cases.parameter import IMPLAUSIBLE, LED
 from compressor.cases.table import GROUPS, READ, WORDS, table
@@ -450,7 +450,7 @@ def friction_rules(case: Case) -> Rules:
             "out",
         )
     slow, fast = friction.stiction_velocity_mm_per_s, friction.friction_velocity_mm_per_s
-    if law_of(friction) in READ_BY["friction"]["friction_velocity_mm_per_s"] and fast <= slow:
+    if friction.law in READ_BY["friction"]["friction_velocity_mm_per_s"] and fast <= slow:
         yield (
             "friction.friction_velocity_mm_per_s",
             f"{fast:g} mm/s must exceed the stiction_velocity_mm_per_s, {slow:g} mm/s",

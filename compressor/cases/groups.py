@@ -95,7 +95,7 @@ class Machine:
     )  # fmt: skip
     gravity_m_per_s2: float = number(0.0, "[0, 1000]", "gravity, along -y", "assumed")
     counterweight_kg_mm: float | None = number(
-        None, "[0, 1e9]",
+        0.0, "[0, 1e9]",
         "counterweight on the crank, opposite to its pin: mass times its centre's distance from "
         "the axis",
         "none",
@@ -116,8 +116,10 @@ class Machine:
             values["rod_centre_mm"] = length / 2
         if self.rod_inertia_kg_m2 is None:
             values["rod_inertia_kg_m2"] = mass * (length / 1000) ** 2 / 12
-        if not self.counterweight_kg_mm:  # as without the key
+        if self.balance is not None:
             values["counterweight_kg_mm"] = None
+        elif self.counterweight_kg_mm is None:
+            values["counterweight_kg_mm"] = 0.0
 
 
 # ends of a cylinder, and the actions by which the gas in them presses
@@ -327,8 +329,8 @@ class Contact:
         ),
         AT_JOINTS,
     )  # fmt: skip
-    geometry: str | None = choice(
-        None, ("external", "internal"),
+    geometry: str = choice(
+        "external", ("external", "internal"),
         "radii in the materials' stiffness: of two discs (the paper's, and the default for its "
         "pin), or of a pin in a bore (the default with a pin radius of a file's own)",
         "Eq. 15", read=(CLEARANCE, "contact.materials"),
@@ -368,8 +370,6 @@ class Contact:
             vars(self)["stiffness_N_per_mm15"] = None
         elif self.stiffness_N_per_mm15 is None:
             vars(self)["stiffness_N_per_mm15"] = PAPER_STIFFNESS
-        if self.geometry == "external":  # as without the key
-            vars(self)["geometry"] = None
         fill_by_law("contact", self)
 
 
@@ -390,9 +390,7 @@ class Friction:
     friction_velocity_mm_per_s: float = number(
         100.0, "(0, 1e6]", "friction transition velocity", "Table 3"
     )
-    law: str | None = choice(
-        None, FRICTION_LAWS, "friction law (adams where none is named)", "Eq. 16"
-    )
+    law: str = choice("adams", FRICTION_LAWS, "friction law", "Eq. 16")
     bristle_stiffness_per_mm: float | None = number(
         None, "(0, 1e9]", "LuGre's sigma_0 over the normal force; 100 by default",
         judged=(10.0, 1e4),
@@ -404,18 +402,14 @@ class Friction:
     viscous_s_per_mm: float | None = number(
         None, "[0, 1e6]", "LuGre's sigma_2 over the normal force; 0 by default"
     )
-    ideal_joints: bool | None = flag(
-        None, "friction in joints without clearance, too",
+    ideal_joints: bool = flag(
+        False, "friction in joints without clearance, too",
         read="not (clearance_mm.big_end > 0 and clearance_mm.small_end > 0)",
     )  # fmt: skip
 
     def __post_init__(self) -> None:
         """Fill in what the law reads."""
         fill_by_law("friction", self)
-        if self.law == FRICTION_LAWS[0]:  # as without the key
-            vars(self)["law"] = None
-        if not self.ideal_joints:  # as without the key
-            vars(self)["ideal_joints"] = None
 
 
 @make_group

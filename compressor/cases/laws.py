@@ -41,16 +41,11 @@ USUAL = {
 }
 
 
-def law_of(group: Any) -> str:
-    """Return the law of a case's contact or friction by name."""
-    return str(group.law or FRICTION_LAWS[0])
-
-
 def fill_by_law(name: str, group: Any) -> None:
     """Fill in what the law of contact or friction reads; the rest has its default."""
-    law, values = law_of(group), vars(group)
+    values = vars(group)
     for key, readers in READ_BY[name].items():
-        if law not in readers:
+        if group.law not in readers:
             values[key] = type(group).__dataclass_fields__[key].default
         elif values[key] is None and key in USUAL:
             values[key] = USUAL[key]

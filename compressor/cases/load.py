@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from compressor.cases.case import Case
 from compressor.cases.checks import DOUBLES, expand_synonyms, key_of, row_of, stands_for, value_of
 from compressor.cases.comparison import NoComparison, Test, comparison, condition
-from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of, reads
+from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of
 from compressor.cases.keys import (
     covers,
     merge_block,
@@ -369,7 +369,7 @@ def _check_some(
         if not (found.wrong or found.misfits):
             found.keys.append(case.key)
             for key in columns:
-                found.values[key].append(axis_value(case, block, place, key))
+                found.values[key].append(value_of(case, key))
             if only is None or is_selected(only, block.given_of(place), case):
                 found.selected.append(number)
     return found
@@ -378,17 +378,6 @@ def _check_some(
 def is_selected(only: Test, given: Mapping[str, Any], case: Case) -> bool:
     """Return whether a comparison holds for a job; given: nested values of the file."""
     return only(reader(given, lambda: case))
-
-
-def axis_value(case: Case, block: Block, place: int, key: str) -> Any:
-    """Return a job's value on an axis, as its case has it; None where it has none.
-
-    What a case writes as without the key the values of its place in the block alone have.
-    """
-    own = value_of(case, key)
-    if own is not None or not row_of(key) or not reads(case, key):
-        return own
-    return value_of(block.given_of(place), key)
 
 
 def _find_problems(paths: Sequence[str | os.PathLike[str]], max_jobs: int) -> list[Problem]:

@@ -105,7 +105,7 @@ def _contact(case: Case, p: dict[str, Any]) -> None:
     p["damping"] = to_si(contact.damping_N_s_per_mm, "N s/mm")
     p["full_damping"] = to_si(contact.full_damping_mm, "mm")
     p["least_approach"] = to_si(contact.least_approach_mm_per_s or NO_APPROACH, "mm/s")
-    law = (friction.law or "adams") if friction else "none"
+    law = friction.law if friction else "none"
     choose_laws(p, contact.law, contact.restitution or 1.0, law)
     p["clearance"] = [to_si(getattr(case.clearance_mm, joint), "mm") for joint in JOINTS]
     p["stiffness"] = [stiffness_of(case, joint) for joint in JOINTS]

@@ -40,7 +40,7 @@ def test_a_case_is_replaced_in_the_words_of_a_case():
 def test_a_pin_of_a_file_s_own_lies_in_its_bore():
     """As of two discs, the paper's, K is a ninth of it."""
     own, paper = case(contact=MATERIALS, machine={"pin_radius_mm": 35}), case(contact=MATERIALS)
-    assert (own.contact.geometry, paper.contact.geometry) == ("internal", None)
+    assert (own.contact.geometry, paper.contact.geometry) == ("internal", "external")
     bore = contact_stiffness("steel", "copper", 0.035, 0.0352, internal=True)
     assert record(own)["stiffness"] == pytest.approx(bore, rel=1e-14)
     discs = case(contact=MATERIALS | {"geometry": "external"}, machine={"pin_radius_mm": 35})

@@ -70,10 +70,7 @@ def contact_values(law: str, case: Case) -> Values | None:
     if not faulty(case):
         return None
     # without a geometry, materials would be those of pins in their bores
-    values: dict[str, Any] = {
-        "contact.law": law,
-        "contact.geometry": contact.geometry or "external",
-    }
+    values: dict[str, Any] = {"contact.law": law, "contact.geometry": contact.geometry}
     if law not in UNDAMPED:
         values["contact.restitution"] = contact.restitution or RESTITUTION
     if law in cases.CYLINDRICAL:
@@ -322,7 +319,7 @@ def scaled_stiffness(case: Case, factor: float) -> tuple[Values, str]:
         each = [solve.stiffness_of(lines, j) / (math.pi * length.at(j) / 1e3) for j in worn]
         each = [contact.modulus_GPa * unit] if contact.modulus_GPa else each
     else:
-        key, unit, values["contact.geometry"] = SCALED[0], 1000.0**contact.exponent, None
+        key, unit = SCALED[0], 1000.0**contact.exponent
         each = [solve.stiffness_of(case, joint) for joint in worn]
     values[key] = factor * (math.prod(each) ** (1.0 / len(each)) / unit)
     return values, "" if max(each) <= SAME_STIFFNESS * min(each) else "of both joints"
