@@ -187,8 +187,9 @@ def test_what_is_printed_are_the_pictures(driver, page):
         "return [seen('img'), seen('.plot')]"
     )
     assert driver.execute_script(shown)[0] == "none"
-    driver.execute_script("setTheme('dark')")
-    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    theme = {"name": "prefers-color-scheme", "value": "dark"}
+    printed = {"media": "print", "features": [theme]}
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", printed)
     assert driver.execute_script(shown) == ["block", "none"]
     paper = driver.execute_script("return getComputedStyle(document.body).backgroundColor")
     assert paper == "rgb(255, 255, 255)"  # of a dark page, too

@@ -1,27 +1,11 @@
-// The page's own script: theme, tables that sort and filter, figures that zoom and tell values.
+// The page's own script: tables that sort and filter, figures that zoom and tell values.
 // Without it, or where a figure's script is missing, the page shows pictures and plain tables.
 "use strict";
 
 const root = document.documentElement;
 const each = (selector, act, within = document) => within.querySelectorAll(selector).forEach(act);
 
-// ---- light and dark -------------------------------------------------------------------------
-const remembered = {
-  get: (key) => { try { return localStorage.getItem(key); } catch { return null; } },
-  set: (key, value) => { try { localStorage.setItem(key, value); } catch { /* not kept */ } },
-};
-const prefersDark = matchMedia("(prefers-color-scheme: dark)");
-const isDark = () => root.dataset.theme === "dark";
-
-function setTheme(theme) {
-  root.dataset.theme = theme;
-  each(".theme", (button) => { button.textContent = isDark() ? "light" : "dark"; });
-  drawn.forEach((figure) => figure.redraw());
-}
-
-// the reader's, else the system's
-const useTheme = () =>
-  setTheme(remembered.get("compsim-theme") ?? (prefersDark.matches ? "dark" : "light"));
+const dark = matchMedia("(prefers-color-scheme: dark)");
 
 // ---- tables ---------------------------------------------------------------------------------
 const collator = new Intl.Collator(undefined, { numeric: true });
@@ -139,7 +123,7 @@ const ON_DARK = {
   "#000000": "#f2f2f2", "#1f4488": "#86aef5", "#d0583b": "#f08a6f", "#ecb44a": "#f2c46d",
   "#b5b5b5": "#6d737d", "#8c8c8c": "#a0a0a0", "#606060": "#b0b0b0", "#303030": "#d0d0d0",
 };
-const tone = (color) => (isDark() && ON_DARK[color]) || color;
+const tone = (color) => (dark.matches && ON_DARK[color]) || color;
 const SCALE = 74; // px that a scale of colours takes
 const TOOLBAR = 90; // px in the upper right corner of a figure
 
@@ -316,23 +300,11 @@ function showJob(key) {
 let told = { results: "results", studies: [], series: [] };
 
 // ---- start ----------------------------------------------------------------------------------
-useTheme(); // before anything is shown
-
 document.addEventListener("DOMContentLoaded", () => {
   const facts = document.getElementById("jobs");
   if (facts) told = JSON.parse(facts.textContent);
-  each(".theme", (button) => {
-    button.hidden = false;
-    button.addEventListener("click", () => {
-      remembered.set("compsim-theme", isDark() ? "light" : "dark");
-      setTheme(isDark() ? "light" : "dark");
-    });
-  });
-  useTheme();
-  prefersDark.addEventListener("change", useTheme);
+  dark.addEventListener("change", () => drawn.forEach((figure) => figure.redraw()));
   each(".scroll", openTable);
-  each("dialog button", (button) =>
-    button.addEventListener("click", () => button.closest("dialog").close()));
   const seen = new IntersectionObserver((entries) => entries.forEach((entry) => {
     if (!entry.isIntersecting) return;
     seen.unobserve(entry.target);
