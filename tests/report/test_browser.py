@@ -71,17 +71,15 @@ def test_the_page_opens_from_disk_and_nothing_breaks(driver, page):
     assert outside == []
 
 
-def test_tables_sort_and_filter(driver, own):
+def test_tables_sort(driver, own):
     opened(driver, own)
     place = "document.querySelector('#jobs-worn table')"
     column = driver.execute_script(
         f"return [...{place}.tHead.rows[0].cells].findIndex(c => /^peak acc/.test(c.textContent))"
     )
     button = driver.find_elements("css selector", "#jobs-worn th button")[column]
-    values = (
-        f"return [...{place}.tBodies[0].rows].filter(r => !r.hidden)"
-        f".map(r => Number(r.cells[{column}].dataset.value))"
-    )
+    cells = f"[...{place}.tBodies[0].rows].map(r => r.cells[{column}])"
+    values = f"return {cells}.map(cell => Number(cell.dataset.value))"
     button.click()
     up = driver.execute_script(values)
     assert len(up) == 12
@@ -90,10 +88,6 @@ def test_tables_sort_and_filter(driver, own):
     assert driver.execute_script(values) == sorted(up, reverse=True)
     head = driver.find_elements("css selector", "#jobs-worn th")[column]
     assert head.get_attribute("aria-sort") == "descending"
-    driver.find_element("css selector", "#jobs-worn input[type=search]").send_keys("small_end 500")
-    assert len(driver.execute_script(values)) == 3
-    told = driver.find_element("css selector", "#jobs-worn output").text
-    assert told == "3 of 12 rows"
 
 
 def test_a_click_on_a_job_tells_of_it(driver, own):

@@ -1,4 +1,4 @@
-// The page's own script: tables that sort and filter, figures that zoom and tell values.
+// The page's own script: tables that sort, figures that zoom and tell values.
 // Without it, or where a figure's script is missing, the page shows pictures and plain tables.
 "use strict";
 
@@ -42,24 +42,6 @@ function sortable(table, rows) {
   });
 }
 
-function filterable(rows, tools) {
-  const label = document.createElement("label");
-  const field = document.createElement("input");
-  const count = document.createElement("output");
-  field.type = "search";
-  label.append("Show rows with ", field);
-  field.addEventListener("input", () => {
-    const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
-    rows.forEach((row) => {
-      const text = row.textContent.toLowerCase();
-      row.hidden = !words.every((word) => text.includes(word));
-    });
-    const shown = rows.filter((row) => !row.hidden).length;
-    count.textContent = shown === rows.length ? "" : `${shown} of ${rows.length} rows`;
-  });
-  tools.append(label, count);
-}
-
 // The key of a job becomes a button that tells of it.
 function openJobs(table) {
   each("tr[data-job] td code", (code) => {
@@ -77,13 +59,7 @@ function openTable(frame) {
   const table = frame.querySelector("table");
   const rows = [...table.tBodies[0].rows];
   openJobs(table);
-  if (rows.length < 2) return;
-  sortable(table, rows);
-  if (rows.length < 12) return;
-  const tools = document.createElement("div");
-  tools.className = "tools";
-  frame.before(tools);
-  filterable(rows, tools);
+  if (rows.length > 1) sortable(table, rows);
 }
 
 // ---- figures --------------------------------------------------------------------------------
