@@ -5,7 +5,6 @@ text that they print.
 """
 
 import base64
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -157,29 +156,10 @@ class Section:
     template: str = "section.html"
 
 
-class JobFacts(NamedTuple):
-    """What a click on a point shows of a study's jobs: by key, in the order of the names."""
-
-    names: Sequence[str]
-    jobs: Mapping[str, Sequence[str]]
-
-
-class JobsToOpen(NamedTuple):
-    """What clicks on points show: the results' folder in a shell's words, and jobs by study.
-
-    series: keys of the jobs whose last revolution lies beside the page.
-    """
-
-    results: str
-    studies: Sequence[JobFacts]
-    series: Sequence[str]
-
-
-NO_JOBS = JobsToOpen("", (), ())
 SUBJECT = "Reciprocating compressor with joint clearance"
 
 
-def templates(files: Mapping[str, bytes] | None = None) -> Environment:
+def templates(files: Mapping[str, bytes]) -> Environment:
     """Return the page's templates, which escape what they print; files: as of `document`."""
 
     def address(name: str) -> Markup:
@@ -203,20 +183,23 @@ def templates(files: Mapping[str, bytes] | None = None) -> Environment:
 
 def document(
     sections: Sequence[Section],
-    jobs: JobsToOpen = NO_JOBS,
-    title: str = "",
-    files: Mapping[str, bytes] | None = None,
+    results: str,
+    series: Sequence[str],
+    title: str,
+    files: Mapping[str, bytes],
 ) -> str:
     """Return the whole page: the first section, a list of contents, and the other sections.
 
-    title: of the page, `SUBJECT` where there is none; files: pictures, tables and scripts that the
-    page is to hold, by name, in place of those beside it.
+    results: their folder in a shell's words; series: keys of the jobs whose last revolution lies
+    beside the page; title: of the page, `SUBJECT` where there is none; files: pictures, tables and
+    scripts that the page is to hold, by name, in place of those beside it.
     """
-    scripts = [Markup(text.decode()) for name, text in (files or {}).items() if name.endswith("js")]
-    data = jobs._asdict() | {"studies": [one._asdict() for one in jobs.studies]}
-    facts = Markup(json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"))
+    scripts = [Markup(text.decode()) for name, text in files.items() if name.endswith("js")]
     page = templates(files).get_template("page.html")
-    return page.render(sections=sections, jobs=facts, title=title, subject=SUBJECT, scripts=scripts)
+    return page.render(
+        sections=sections, results=results, series=series, title=title, subject=SUBJECT,
+        scripts=scripts,
+    )  # fmt: skip
 
 
 class StudyNote(NamedTuple):

@@ -126,16 +126,13 @@ def build_report(
         answer.provenance_section(studies, results, command),
     ]
     series = {
-        key: text
-        for one in drawn
-        for key, text in interactive.job_scripts(stored, one.jobs.jobs, units)
+        key: text for one in drawn for key, text in interactive.job_scripts(stored, one.keys, units)
     }
-    jobs = page.JobsToOpen(shlex.quote(str(results)), [one.jobs for one in drawn], [*series])
     titled = [study for study in studies if study.title]
     titles = {study.title for study in titled if not study.is_trial or titled[0].is_trial}
     title = titles.pop() if len(titles) == 1 else ""  # several machines have it in their sections
     figures = [one for section in sections for one in getattr(section.content, "figures", ())]
-    make_page = partial(page.document, sections, jobs, title)
+    make_page = partial(page.document, sections, shlex.quote(str(results)), [*series], title)
     return figures, series, make_page
 
 
@@ -150,7 +147,7 @@ def choose_studies(results: store.Folder, names: Sequence[str]) -> list[StoredSt
 class DrawnStudy(NamedTuple):
     """What the page has of a user's own study.
 
-    jobs: what a click on a job's point shows; cautions: what to know beside the findings;
+    keys: of the jobs that a click opens; cautions: what to know beside the findings;
     shown: the metrics that its table has.
     """
 
@@ -158,7 +155,7 @@ class DrawnStudy(NamedTuple):
     table: page.Section
     findings: list[answer.MetricChange]
     line: answer.StudyLine
-    jobs: page.JobFacts
+    keys: list[str]
     cautions: list[str]
     shown: set[str]
     is_trial: bool
@@ -190,8 +187,8 @@ def drawn_study(
         ]
         line = describe_run(f"Study {study.name}", section.anchor, data)
         return DrawnStudy(
-            section, table, answer.study_findings(data, units), line,
-            study_section.job_facts(data, keys), motion_cautions(stored, study, data),
+            section, table, answer.study_findings(data, units), line, keys,
+            motion_cautions(stored, study, data),
             {one.variable for one in measures(data)}, study.is_trial,
         )  # fmt: skip
 

@@ -20,7 +20,6 @@ from compressor.store import Stored, StoredStudy, study_caveats
 from compressor.units import Units
 
 MAX_ROWS = 500
-MAX_FACTS = 2000  # jobs whose points show where they are
 KEY_DIGITS = 10  # digits of a job's key
 
 
@@ -112,22 +111,6 @@ def job_counts(data: xr.Dataset) -> Counts:
     status = data["status"].values
     failed, missing = int((status == "failed").sum()), int((status == "missing").sum())
     return Counts(status.size - failed - missing, failed, missing)
-
-
-def job_facts(data: xr.Dataset, keys: Sequence[str]) -> page.JobFacts:
-    """Return what a click on a job's point shows: its place in the sweep, and how it ended.
-
-    keys: of the jobs; only the first MAX_FACTS are shown.
-    """
-    swept = swept_values(data)
-    place = {str(key): n for n, key in enumerate(data["key"].values.flat)}
-    status, reason = (data[name].values.ravel() for name in ("status", "reason"))
-    found = {}
-    for key in [key for key in dict.fromkeys(keys) if key in place][:MAX_FACTS]:
-        n = place[key]
-        point = [page.value_cell(values[n]).text for values in swept.values()]
-        found[key] = [*point, page.status_text(status[n], reason[n])]
-    return page.JobFacts([*swept, "status"], found)
 
 
 def list_failures(stored: Stored, data: xr.Dataset) -> list[str]:

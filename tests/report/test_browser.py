@@ -102,8 +102,9 @@ def test_a_click_on_a_job_tells_of_it(driver, own):
     key = driver.execute_script("return document.querySelector('tr[data-job]').dataset.job")
     assert key[:10] in box.text
     assert "compsim show" in box.text
+    assert "speed_rpm\n300" in box.text
     box.find_element("css selector", "a").click()
-    assert driver.execute_script("return document.querySelector('tr.chosen').dataset.job") == key
+    assert driver.execute_script("return document.querySelector('tr:target').dataset.job") == key
 
 
 @pytest.mark.parametrize("dark", [False, True])

@@ -23,7 +23,9 @@ function compare(a, b) {
   return collator.compare(a, b);
 }
 
-function sortable(table, rows) {
+function sortable(table) {
+  const rows = [...table.tBodies[0].rows];
+  if (rows.length < 2) return;
   [...table.tHead.rows[0].cells].forEach((head, column) => {
     const button = document.createElement("button");
     button.type = "button";
@@ -43,23 +45,14 @@ function sortable(table, rows) {
 }
 
 // The key of a job becomes a button that tells of it.
-function openJobs(table) {
-  each("tr[data-job] td code", (code) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.className = "job";
-    button.title = "where it is in the sweep, how to show it, its last revolution";
-    code.replaceWith(button);
-    button.append(code);
-    button.addEventListener("click", () => showJob(button.closest("tr").dataset.job));
-  }, table);
-}
-
-function openTable(frame) {
-  const table = frame.querySelector("table");
-  const rows = [...table.tBodies[0].rows];
-  openJobs(table);
-  if (rows.length > 1) sortable(table, rows);
+function openJob(code) {
+  const button = document.createElement("button");
+  button.type = "button";
+  button.className = "job";
+  button.title = "where it is in the sweep, how to show it, its last revolution";
+  code.replaceWith(button);
+  button.append(code);
+  button.addEventListener("click", () => showJob(button.closest("tr").dataset.job));
 }
 
 // ---- figures --------------------------------------------------------------------------------
@@ -234,34 +227,32 @@ class Figure {
 }
 
 // ---- jobs behind points ---------------------------------------------------------------------
+// The dialog about a job: its row in a table up to how it ended, and its last revolution.
 function showJob(key) {
   const box = document.getElementById("job");
-  const rows = [...document.querySelectorAll("tr[data-job]")]
-    .filter((one) => one.dataset.job === key);
-  const study = told.studies.find((one) => key in one.jobs);
   box.querySelector("h2").textContent = `Job ${key.slice(0, 10)}`;
+  const row = document.querySelector(`tr[data-job="${key}"]`);
   const list = box.querySelector("dl");
   list.replaceChildren();
-  study?.names.forEach((name, n) => {
-    const [term, value] = [document.createElement("dt"), document.createElement("dd")];
-    term.textContent = name;
-    value.textContent = study.jobs[key][n];
-    list.append(term, value);
-  });
+  if (row) {
+    const heads = [...row.closest("table").tHead.rows[0].cells].map((head) => head.textContent);
+    heads.slice(0, heads.indexOf("status") + 1).forEach((name, n) => {
+      const [term, value] = [document.createElement("dt"), document.createElement("dd")];
+      term.textContent = name;
+      value.textContent = row.cells[n].textContent;
+      list.append(term, value);
+    });
+    row.id = `row-${key}`;
+  }
   const command = box.querySelector("code");
-  command.textContent = `compsim show ${key.slice(0, 10)} -r ${told.results}`;
+  command.textContent = `compsim show ${key.slice(0, 10)} -r ${box.dataset.results}`;
   const link = box.querySelector("a");
-  link.hidden = !rows.length;
-  link.onclick = (event) => {
-    event.preventDefault();
-    box.close();
-    each("tr.chosen", (other) => other.classList.remove("chosen"));
-    rows.forEach((row) => row.classList.add("chosen"));
-    rows[0].scrollIntoView({ block: "center" });
-  };
+  link.hidden = !row;
+  link.href = `#row-${key}`;
+  link.onclick = () => box.close();
   box.querySelector("figure")?.remove();
   box.showModal();
-  if (told.series.includes(key)) {
+  if (box.dataset.series.split(" ").includes(key)) {
     const frame = document.createElement("figure");
     frame.id = `job-${key}`;
     frame.dataset.title = "last revolution";
@@ -273,14 +264,11 @@ function showJob(key) {
   }
 }
 
-let told = { results: "results", studies: [], series: [] };
-
 // ---- start ----------------------------------------------------------------------------------
 document.addEventListener("DOMContentLoaded", () => {
-  const facts = document.getElementById("jobs");
-  if (facts) told = JSON.parse(facts.textContent);
   dark.addEventListener("change", () => drawn.forEach((figure) => figure.redraw()));
-  each(".scroll", openTable);
+  each("tr[data-job] td code", openJob);
+  each("table", sortable);
   const seen = new IntersectionObserver((entries) => entries.forEach((entry) => {
     if (!entry.isIntersecting) return;
     seen.unobserve(entry.target);
