@@ -1,8 +1,8 @@
 """Try the program with the oldest versions of its libraries that pyproject.toml allows.
 
-`python3 tests/oldest.py` installs them and the program into a folder of its own, prints help and
-runs one job. With `--tests` it runs a sample of the tests there, too. The bounds are those of
-Python 3.11: other versions have no wheels of some of them, and there nothing is tried.
+`python3 tests/oldest.py` installs them and the program into a folder of its own, prints help, runs
+one job and reports it. With `--tests` it runs a sample of the tests there, too. The bounds are
+those of Python 3.11: other versions have no wheels of some of them, and there nothing is tried.
 """
 
 import re
@@ -48,7 +48,7 @@ def try_oldest(place, with_tests):
     install(call, *pins, *(TOOLS if with_tests else ()))
     install(call, "--no-deps", source)
     (place / "oldest.yaml").write_text(CASE, encoding="utf-8")
-    for words in ("--version", "--help", "run oldest.yaml -j 1", "verify"):
+    for words in ("--version", "--help", "run oldest.yaml -j 1", "verify", "report"):
         call("compsim", *words.split())
     if with_tests:
         tests = [ROOT / "tests" / name for name in SAMPLE]
