@@ -270,22 +270,13 @@ def probable_keys(name: str, group: str) -> list[str]:
         return [f"{group}.{near}".lstrip(".")]
     own = [key for key in every if key.startswith(f"{group}.") or not group]
     near = _nearest(name, [_leaf(key) for key in own], 0.8)
-    words = {word for word in name.lower().split("_") if word}
+    words = {*name.lower().split("_")} - {""} or {name}
+    own_parts = [key for key in table() if key.startswith(group)]
     return (
         [key for key in own if _leaf(key) == near]
-        or [
-            key
-            for key in table()
-            if key.startswith(group) and words and words <= {*re.split("[_.]", key.lower())}
-        ]
-        or [key for key in own if group and ends_in(name, _leaf(key))]
+        or [key for key in own_parts if words <= {*re.split("[_.]", key.lower())}]
+        or [key for key in own if group and words >= {*split_unit(_leaf(key))[0].split("_")}]
     )
-
-
-def ends_in(name: str, key: str) -> bool:
-    """Return whether a name is a key with words before it, in the key's unit or without one."""
-    (stem, unit), (short, ours) = split_unit(name), split_unit(key)
-    return stem.endswith(f"_{short}") and unit in ("", ours)
 
 
 def _leaf(key: str) -> str:
