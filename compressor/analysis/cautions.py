@@ -177,7 +177,7 @@ Remarks = Iterator[tuple[str, str]]  # of a case: a key, and what is odd about i
 
 def check_judged(case: Case) -> Remarks:
     """Yield values outside the range that the program was judged on."""
-    yield from outside_judged(case.values()).items()
+    yield from outside_judged(case).items()
 
 
 def check_paper_pin(case: Case) -> Remarks:

@@ -134,33 +134,25 @@ def default_in(case: Case, key: str) -> Any:
     return getattr(getattr(replace(case, **without), group), name)
 
 
-OF_CONTACT = ("contact.", "friction.")  # keys that ideal joints do not read
-# keys that leave a thing out at 0, as a case without the group does
-ABSENT_AT_ZERO = ("guide.clearance_mm", "guide.friction")
+def outside_judged(case: Case) -> dict[str, str]:
+    """Return the keys that a case reads with values outside the judged range, with a sentence each.
 
-
-def outside_judged(values: Mapping[str, Any]) -> dict[str, str]:
-    """Return the keys of a case whose values are outside the judged range, each with a sentence.
-
-    values: nested, of one case (`Case.values`). A sentence continues the key: "262 kg is outside
-    the range that the program was judged on, 0.1 to 200 kg". Clearances of both joints are one key.
+    A sentence continues the key: "262 kg is outside the range that the program was judged on, 0.1
+    to 200 kg".
     """
     found = {}
-    ideal = values.get("joint") == "none"
     for key, row in table().items():
-        if row.judged is None or (ideal and key.startswith(OF_CONTACT)):
+        value: Any = value_of(case, key) if row.judged else None
+        if row.judged is None or not is_number(value) or is_off(key, value):
             continue
-        value, whole = value_of(values, key), key.rpartition(".")[0]
-        if not is_number(value):
-            continue
-        if not value and (key in ABSENT_AT_ZERO or whole == "clearance_mm"):
-            continue
-        if key == "contact.stiffness_N_per_mm15" and value_of(values, "contact.exponent") != 1.5:
+        if key == "contact.stiffness_N_per_mm15" and case.contact.exponent != 1.5:
             continue  # the stiffness has another unit
         low, high = row.judged
-        if not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
+        is_inside = low * (1 - 1e-9) <= value <= high * (1 + 1e-9)
+        if not is_inside and reads(case, key) and (value or key != "guide.friction"):
             unit = f" {row.unit}".replace("^p", "^1.5").rstrip()
-            is_shared = whole == "clearance_mm" or (stands_for(whole) and value_of(values, whole))
+            whole = key.rpartition(".")[0]
+            is_shared = stands_for(whole) and value_of(case, whole) is not None
             found[whole if is_shared else key] = (
                 f"{value:g}{unit} is outside the range that the program was judged on, "
                 f"{low:g} to {high:g}{unit}"

@@ -130,5 +130,5 @@ def _of_cases(cases: Iterable[Case]) -> list[str]:
     outside: dict[str, str] = {}
     for case in cases:
         notes |= paper_notes(case)
-        outside |= outside_judged(case.values())
+        outside |= outside_judged(case)
     return [f"{key}: {text}" for key, text in (*notes.items(), *outside.items())]

@@ -14,7 +14,7 @@ LOOSE = {"joint": "both", "clearance_mm": 0.2}
 
 
 def outside(**values):
-    return outside_judged(Case.from_values({**LOOSE, **values}).values())
+    return outside_judged(Case.from_values({**LOOSE, **values}))
 
 
 def test_the_defaults_are_inside():
@@ -29,11 +29,13 @@ def test_the_ends_are_inside():
             assert key not in outside(**{group: {name: end}})
             beyond = end * (0.9 if end == row_of(key).judged[0] else 1.1)
             assert key in outside(**{group: {name: beyond}})
+    both = {"big_end": 2.0, "small_end": 5.0}
+    assert {*outside(clearance_mm=both)} == {f"clearance_mm.{joint}" for joint in both}
 
 
 def test_what_is_not_read_is_not_outside():
     ideal = {"contact": {"damping_N_s_per_mm": 1e5}, "friction": {"static": 0.9}}
-    assert outside_judged(Case.resolve(ideal).values()) == {}
+    assert outside_judged(Case.resolve(ideal)) == {}
     assert {*outside(**ideal)} == {"contact.damping_N_s_per_mm", "friction.static"}
     other = {"contact": {"exponent": 1.1, "stiffness_N_per_mm15": 100.0}}  # in another unit
     assert outside(**other) == {}
