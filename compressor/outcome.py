@@ -60,8 +60,7 @@ class Outcome:
 
     `numbers`: a scalar of dtype ROW, metrics nan where the run did not reach its end; `reason`: a
     stable name, empty when ok; `attributes`: those of the job's Dataset, its `key` among them;
-    `series`: the time series that are to be stored, {} where none are; `compress`: whether these
-    are to be deflated.
+    `series`: the time series that are to be stored, {} where none are.
     """
 
     status: str
@@ -69,7 +68,6 @@ class Outcome:
     numbers: np.void
     attributes: dict[str, Any]
     series: "dict[str, Variable]" = field(default_factory=dict)
-    compress: bool = False
 
     @property
     def key(self) -> str:
@@ -81,15 +79,13 @@ class Outcome:
         """Return what is known of a failure beyond its reason."""
         return str(self.attributes.get("detail", ""))
 
-    def with_series(
-        self, variables: Mapping[str, tuple], precision: str, compress: bool = False
-    ) -> "Outcome":
+    def with_series(self, variables: Mapping[str, tuple], precision: str) -> "Outcome":
         """Return this outcome with time series to be stored, in single or double precision."""
         series = {}
         for name, (dims, values, attrs) in variables.items():
             is_exact = precision == "double" or "time" not in dims or name in ABSCISSAE
             series[name] = Variable(dims, np.asarray(values, float if is_exact else "f4"), attrs)
-        return replace(self, series=series, compress=compress)
+        return replace(self, series=series)
 
     def table(self, more: Mapping[str, tuple]) -> "dict[str, Variable]":
         """Return the variables of the job's Dataset: words, numbers, and more of them.

@@ -179,8 +179,7 @@ def outcome_of(dataset):
         for name, item in dataset.variables.items()
         if item.dtype.kind == "f" and item.dims and name not in NUMBERS and name not in SIZES
     }
-    output = Case.from_attribute(dataset.attrs["case"]).output
-    return found.with_series(series, output.precision, output.compress)
+    return found.with_series(series, Case.from_attribute(dataset.attrs["case"]).output.precision)
 
 
 def write_batch(folder, outcomes):

@@ -483,16 +483,12 @@ class Output:
     )  # fmt: skip
     precision: str = choice(
         "double", ("double", "single"),
-        "precision of the time series; time and crank angle are double", identity=False,
-        read="output.keep == series",
+        "precision of the time series; single: gzipped, time and crank angle double",
+        identity=False, read="output.keep == series",
     )  # fmt: skip
     signals: bool = flag(
         False,
         "metrics of the rod load, and more time series: forces on frame, bearing and guide, torque "
         "and rod load",
         identity=False,
-    )  # fmt: skip
-    compress: bool = flag(
-        False, "compression of the time series: shuffled and gzipped", identity=False,
-        read="output.keep == series",
     )  # fmt: skip

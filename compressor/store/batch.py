@@ -45,7 +45,7 @@ FOLDER, SUFFIX = "batches", ".h5"
 WORDS = {
     "physics_key": "hash of what a job simulates, not how",
     **JOB_WORDS,
-    "kept": "what is kept: bars, horizon, signals, series, these in double precision, compressed",
+    "kept": "what is kept: bars, horizon, signals, series, these in double precision",
 }
 LABELS = {
     "joint": JOINTS, "axis": AXES, "quantile": QUANTILES, "segment": SEGMENTS,
@@ -124,8 +124,8 @@ def encode_batch(outcomes: Sequence[Outcome]) -> bytes:
         **coordinates(dim for dims, _, _ in series.values() for dim in dims),
         **series,
     }
-    compress = any(one.compress for one in outcomes)
-    return encode_netcdf(variables, {"comment": "SI units"}, series if compress else ())
+    is_single = any(one.values.dtype.char == "f" for one in series.values())
+    return encode_netcdf(variables, {"comment": "SI units"}, series if is_single else ())
 
 
 def _words(outcome: Outcome) -> dict[str, str]:
@@ -137,7 +137,6 @@ def _words(outcome: Outcome) -> dict[str, str]:
         "signals": attributes.get("signals"),
         "series": series,
         "double": series and series.values.dtype.char == "d",
-        "compressed": series and outcome.compress,
     }
     text = " ".join(name for name, is_kept in kept.items() if is_kept)
     return outcome.words() | {"physics_key": str(attributes.get("physics_key", "")), "kept": text}
@@ -293,7 +292,6 @@ def read_outcomes(path: Path) -> list[Outcome]:
                 values.view(ROW)[0],
                 read_attributes_of(path, row),
                 next(series) if columns["samples"][row] else {},
-                b"compressed" in columns["kept"][row],
             )
             for row, values in enumerate(numbers)
         ]

@@ -51,13 +51,12 @@ def asking(case: Case, more: Set[str]) -> Case:
 def serving_both(first: Case, second: Case) -> Case:
     """Return a case with all that two cases of one key ask for beside it."""
     found = asking(first, asked_by(second))
-    keeping = [one.output.compress for one in (first, second) if one.output.keep == "series"]
     solve = replace(
         found.solve,
         horizon=found.solve.horizon or second.solve.horizon,  # it may be auto
         timeout_s=max(first.solve.timeout_s, second.solve.timeout_s),
     )
-    return replace(found, solve=solve, output=replace(found.output, compress=all(keeping)))
+    return replace(found, solve=solve)
 
 
 @dataclass(frozen=True)

@@ -169,8 +169,7 @@ def run_job(case: Case) -> Outcome:
 
     with ignore_warnings():  # a solver's remarks; what matters is in the result
         outcome, series = observe(case)
-    output = case.output
-    return outcome.with_series(series, output.precision, output.compress) if series else outcome
+    return outcome.with_series(series, case.output.precision) if series else outcome
 
 
 def store_outcomes(folder: Path, outcomes: Sequence[Outcome]) -> list[JobEnd]:

@@ -203,7 +203,7 @@ ENTRIES = {
         solve__max_steps=5, solve__timeout_s=1e-9,
     ),
     "output.keep": Entry("metrics", IDEAL | {"output": {}}),
-    **entries(LONG_SERIES, SMALL_FILES, output__precision="single", output__compress=True),
+    **entries(LONG_SERIES, SMALL_FILES, output__precision="single"),
     "output.signals": Entry(True, SMALL_FILES),
 }  # fmt: skip
 RIVALS = {"solve.duration_s": "duration_rev", "solve.output_step_s": "output_step_deg",
@@ -257,7 +257,7 @@ def stored(case: Case) -> dict[str, str]:
     found["name"] = run.attributes["name"]
     found["worn"] = Case.from_attribute(run.attributes["case"]).worn_joint
     if series and case.steps > 1000:  # of long ones: the text of the case is longer by the key
-        kept = run.with_series(series, case.output.precision, case.output.compress)
+        kept = run.with_series(series, case.output.precision)
         found["file"] = str(round(len(encode_batch([kept])) / 10_000))
     if case.wear:
         worn = Worn(case)
