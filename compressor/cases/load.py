@@ -324,8 +324,6 @@ def _check_cases(
         progress(0, total, remark)
         parts = [check(range(total), progress)]
     else:
-        for block in cases.blocks:
-            block.mark_cards()
         half = total // 2
         with work_beside(lambda: check(range(half, total))) as others:
             progress(0, total, remark)  # after which a thread may draw it

@@ -91,24 +91,18 @@ class Block:
         return found
 
     @cached_property
-    def card_keys(self) -> list[str]:
-        """Return the keys of cards that are given."""
-        return [key for key in self.given if (row := row_of(key)) and row.kind == "card"]
-
-    @cached_property
-    def mark(self) -> Callable[[str, str], str]:
-        """Return the function that marks a key's card, each as it was at first.
+    def cards(self) -> dict[str, dict[str, str]]:
+        """Return the cards that are given, by key and path, each with the digest of its numbers.
 
         A job's key has the digest of when it was planned. Were a card read again where its case is
         made for a run, a file that has changed would be computed under the key of the old one.
         """
-        return cache(mark_path)
-
-    def mark_cards(self) -> None:
-        """Mark every card that is given, so that copies of this process mark them alike."""
-        for key in self.card_keys:
-            for card in self.columns.get(key, [self.given[key]]):
-                self.mark(key, card)
+        given = {key: self.columns.get(key, [one]) for key, one in self.given.items()}
+        return {
+            key: {card: mark_path(key, card) for card in cards if isinstance(card, str)}
+            for key, cards in given.items()
+            if (row := row_of(key)) and row.kind == "card"
+        }
 
     @property
     def numbers(self) -> Sequence[int]:
@@ -159,9 +153,9 @@ class Block:
     def case(self, number: int) -> Case:
         """Return the case of one combination. Raises CaseError where its values do not fit."""
         values = {"name": self.name or "case", **self.values_of(number)}
-        for key in self.card_keys:
+        for key, marked in self.cards.items():
             if isinstance(card := value_of(values, key), str):
-                values = put(values, path_of(key), self.mark(key, card))
+                values = put(values, path_of(key), marked[card])
         return Case.resolve(values)
 
     def _case_if_any(self, number: int) -> Case | None:
@@ -458,6 +452,7 @@ class Cases(Sequence[Case]):
 
     def __init__(self, blocks: Sequence[Block]):
         self.blocks = blocks
+        self.cards = [block.cards for block in blocks]  # read now, once for copies of this process
         self.ends = [*itertools.accumulate(len(block.numbers) for block in blocks)]
         self.keys: Sequence[str] = ()
 
