@@ -57,7 +57,7 @@ from compressor.cases.parameter import (
     problems_of,
     quote_value,
 )
-from compressor.cases.table import GROUPS, TOP, WORDS, outside_identity, parts_by_key, table
+from compressor.cases.table import GROUPS, TOP, WORDS, parts_by_key, table
 from compressor.cases.yaml_reader import Problem
 from compressor.metrics import JOINTS
 
@@ -75,13 +75,8 @@ AS_WITHOUT = {
 }  # fmt: skip
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
 KEY_TEXT = json.JSONEncoder(sort_keys=True, separators=(",", ":"), check_circular=False)
-# the groups with a key that results depend on; of `solve` the span and the solver are parts
-IDENTITY_GROUPS = tuple(
-    name
-    for name in GROUPS
-    if name != "solve"
-    and any(key.partition(".")[0] == name for key in table().keys() - outside_identity())
-)
+# the groups that results depend on; of `solve` the span and the solver are parts of a key
+IDENTITY_GROUPS = tuple(name for name in GROUPS if name not in ("wear", "solve", "output"))
 
 
 def group(name: str) -> Any:
@@ -275,11 +270,13 @@ stroke, 240 mm
 
         Those that `joint` names, but for a clearance that is healthy.
         """
-        named = JOINTS if self.joint == "both" else (self.joint,)
-        least = {one: self.healthy_clearance_mm.at(one) for one in JOINTS}
-        sound = [one for one in JOINTS if 0.0 < least[one] >= self.clearance_mm.at(one)]
-        worn = [one for one in named if one not in sound]
-        return "both" if len(worn) > 1 else worn[0] if worn else "none"
+        worn = [
+            joint
+            for joint in JOINTS
+            if self.joint in (joint, "both")
+            and not 0.0 < self.healthy_clearance_mm.at(joint) >= self.clearance_mm.at(joint)
+        ]
+        return "both" if len(worn) > 1 else (*worn, "none")[0]
 
     @property
     def unbalance(self) -> float:
