@@ -44,7 +44,6 @@ def test_a_pin_of_a_file_s_own_lies_in_its_bore():
     bore = contact_stiffness("steel", "copper", 0.035, 0.0352, internal=True)
     assert record(own)["stiffness"] == pytest.approx(bore, rel=1e-14)
     discs = case(contact=MATERIALS | {"geometry": "external"}, machine={"pin_radius_mm": 35})
-    assert discs.contact.geometry is None
     assert (record(discs)["stiffness"] < record(own)["stiffness"] / 9).all()
 
 
