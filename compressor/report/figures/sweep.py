@@ -92,9 +92,9 @@ def draw_grid(
         maps = sweep_maps.draw_maps(sweep, shown)
         yield DrawnFigure(maps, sentence, [*cut, *about], zone_words(shown, limits), "map", title)
         return
-    role = sweep_panels.roles_of(sweep, order)
-    x, color = (sweep.axes[n] for n in role)
-    others = [axis.phrase for n, axis in enumerate(sweep.axes) if n not in role]
+    chosen = sweep_panels.choose_axes(sweep, order)
+    x, color = (sweep.axes[n] for n in chosen)
+    others = [axis.phrase for n, axis in enumerate(sweep.axes) if n not in chosen]
     point = f"the mean over {' and '.join(others)}" if others else "a job"
     sentence = (
         f"Every metric over {x.phrase}, a colour for each value of {color.phrase}; a point is "
@@ -102,7 +102,7 @@ def draw_grid(
     )
     cut = [*count_drawn(x, sweep_panels.MAX_PLACES), *count_drawn(color, sweep_panels.MAX_LINES)]
     yield DrawnFigure(
-        sweep_panels.draw_overview(sweep, role, shown), sentence, [*cut, *about],
+        sweep_panels.draw_overview(sweep, chosen, shown), sentence, [*cut, *about],
         " What is not known within its error bar is no part of a mean." * bool(others),
         "overview", f"metrics over {x.phrase} and {color.phrase}",
     )  # fmt: skip

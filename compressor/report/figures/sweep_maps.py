@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import plotly.graph_objects as go
@@ -26,73 +25,44 @@ COLORS = "cividis"
 MAX_CELLS = 64  # along an axis
 
 
-def orient_axes(sweep: PlottedSweep) -> tuple[int, int]:
-    """Return which of two axes lies along x, and which, of words or few values, along y."""
-    first, second = sweep.axes
-    rank = [(not axis.is_words, axis.values.size) for axis in (first, second)]
-    return (0, 1) if rank[0] >= rank[1] else (1, 0)
-
-
-class Cells(NamedTuple):
-    """The jobs of a map: its axes in x and y, and the cells' keys."""
-
-    axes: tuple[PlottedAxis, PlottedAxis]
-    keys: np.ndarray
-
-    @property
-    def centres(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the places of the cells' middles along x and y."""
-        x, y = self.axes
-        return x.places, y.places
-
-
 def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> go.Figure:
     """Return a map of every measure over both axes of a grid, a cell a job.
 
-    At most MAX_CELLS along an axis.
+    At most MAX_CELLS along an axis; the axis of fewer values lies along y.
     """
-    in_x, in_y = orient_axes(sweep)
-    sweep = coarse(coarse(sweep, 0, MAX_CELLS), 1, MAX_CELLS)
-    x, y = sweep.axes[in_x], sweep.axes[in_y]
-
-    def table(values: np.ndarray) -> np.ndarray:
-        return values.transpose(in_y, in_x)
-
-    status, chaotic = table(sweep.status), table(sweep.chaotic)
-    cells = Cells((x, y), table(sweep.keys))
+    x, y = sorted(sweep.axes, key=lambda axis: -axis.values.size)
+    table = PlottedSweep(sweep.data.transpose(y.name, x.name, ...), (x, y))
+    table = coarse(coarse(table, 0, MAX_CELLS), 1, MAX_CELLS)
+    x, y = table.axes
+    marks = [(table.status == word, mark, NAMES[word]) for word, mark in MARKS.items()]
+    ring = replace(sweep_panels.RING, markersize=6.0)
+    marks.append((table.chaotic, ring, sweep_panels.CHAOTIC))
     drawing = sweep_panels.metric_panels(measures, 2.6, "all", "all")
     for panel, measure in zip(drawing.panels, measures, strict=True):
         panel.label("y", "")  # the colours have the unit
-        bars = measure.bar(sweep.data)
-        plot_map(panel, cells, table(measure.of(sweep.data)), bars, measure)
-        mark_cells(panel, cells, status, chaotic)
+        plot_map(panel, table, measure)
+        for here, mark, name in marks:
+            rows, columns = np.nonzero(here)
+            places = x.places[columns], y.places[rows]
+            sweep_panels.mark_points(panel, *places, table.keys[here], mark, name)
         scale_map(panel, "x", x, sweep_panels.in_lines(x.words))
         scale_map(panel, "y", y, y.words)
         panel.x.title, panel.y.title = x.title, y.title
     return drawing.figure()
 
 
-def plot_map(
-    panel: Panel, cells: Cells, table: np.ndarray, bars: np.ndarray, measure: Measure
-) -> None:
+def plot_map(panel: Panel, table: PlottedSweep, measure: Measure) -> None:
     """Draw a measure's cells with their colour scale, on which noise is no pattern."""
     panel.x.showgrid = panel.y.showgrid = False
-    values, is_log = table[np.isfinite(table)], spans_decades(table)
+    x, y = table.axes
+    cells = measure.of(table.data)
+    values, is_log = cells[np.isfinite(cells)], spans_decades(cells)
+    bars = measure.bar(table.data)
     ends = (values.min(), values.max()) if is_log else sweep_panels.span_around(values, bars)
     panel.map(
-        *cells.centres, table, style.palette(COLORS), ends, "{}", measure.unit, is_log,
-        measure.title, sweep_panels.job_keys(cells.keys),
+        x.places, y.places, cells, style.palette(COLORS), ends, "{}", measure.unit, is_log,
+        measure.title, sweep_panels.job_keys(table.keys),
     )  # fmt: skip
-
-
-def mark_cells(panel: Panel, cells: Cells, status: np.ndarray, chaotic: np.ndarray) -> None:
-    """Draw marks in the cells of jobs that failed, were not run or are chaotic."""
-    x, y = cells.centres
-    marks = [(status == word, mark, NAMES[word]) for word, mark in MARKS.items()]
-    marks.append((chaotic, replace(sweep_panels.RING, markersize=6.0), sweep_panels.CHAOTIC))
-    for here, mark, name in marks:
-        rows, columns = np.nonzero(here)
-        sweep_panels.mark_points(panel, x[columns], y[rows], cells.keys[here], mark, name)
 
 
 def scale_map(panel: Panel, way: Way, axis: PlottedAxis, words: Sequence[str]) -> None:

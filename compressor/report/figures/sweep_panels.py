@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -202,34 +202,29 @@ def draw_curves(
 MAX_PLACES = 200  # in x
 
 
-class Roles(NamedTuple):
-    """Which axis of a sweep lies in x and which has colours; the others are averaged over."""
-
-    x: int
-    color: int
-
-
-def roles_of(sweep: PlottedSweep, order: Sequence[int]) -> Roles:
-    """Return the roles of the axes; order: the axes' numbers, the strongest first.
+def choose_axes(sweep: PlottedSweep, order: Sequence[int]) -> tuple[int, int]:
+    """Return which axis lies in x and which has colours; order: the strongest first.
 
     In x lies the one of the two strongest axes of numbers that has more values, in colours the
     strongest of the others.
     """
     numbers = [n for n in order if not sweep.axes[n].is_words] or list(order)
     x = max(numbers[:2], key=lambda n: sweep.axes[n].values.size)
-    return Roles(x, next(n for n in order if n != x))
+    return x, next(n for n in order if n != x)
 
 
-def draw_overview(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]) -> go.Figure:
+def draw_overview(
+    sweep: PlottedSweep, chosen: tuple[int, int], measures: Sequence[Measure]
+) -> go.Figure:
     """Return every measure over two axes, as lines; means over the others, if there are any.
 
-    What is not known within its error bar is no part of a mean.
+    chosen: of `choose_axes`. What is not known within its error bar is no part of a mean.
     """
-    sweep = coarse(sweep, role.x, MAX_PLACES)
-    axis, color = (sweep.axes[n] for n in role)
+    sweep = coarse(sweep, chosen[0], MAX_PLACES)
+    axis, color = (sweep.axes[n] for n in chosen)
     lines = lines_for(color, axis.is_words)
     drawing = metric_panels(measures, 2.35, "all")
-    parts = {n: sweep.at(role.color, n) for n in lines} if len(sweep.axes) == 2 else {}
+    parts = {n: sweep.at(chosen[1], n) for n in lines} if len(sweep.axes) == 2 else {}
     for panel, measure in zip(drawing.panels, measures, strict=True):
         scale_x(panel, axis)
         if not parts:
