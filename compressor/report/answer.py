@@ -18,7 +18,7 @@ import xarray as xr
 
 from compressor.analysis import SPOKEN, Claim, mean_peak
 from compressor.cases import MODEL_VERSION, Case
-from compressor.digits import UNKNOWN, is_known, setting
+from compressor.digits import UNKNOWN, setting
 from compressor.metrics import BARRED, JOINTS
 from compressor.outcome import Regime
 from compressor.program import PROGRAM, library_versions
@@ -305,13 +305,7 @@ def finding(
     """
     always = measure.variable in ALWAYS
     title = measure.title[0].upper() + measure.title[1:]
-    relative = BARRED[measure.variable].bar.relative
-    unbarred = np.isnan(bars)
-    sure = [
-        n
-        for n, (value, bar) in enumerate(zip(values.tolist(), bars.tolist(), strict=True))
-        if not math.isnan(value) and (unbarred[n] or is_known(value, bar, relative))
-    ]
+    sure = np.flatnonzero(~np.isnan(measure.known(values, bars))).tolist()
     if not sure:
         if not always or np.isnan(values).all():
             return None

@@ -29,14 +29,6 @@ class LimitError(CompsimError, ValueError):
 
 
 @dataclass(frozen=True)
-class Zone:
-    """A zone: `name`, such as B, or A/B where the error bar holds a limit; `number`: the worse."""
-
-    name: str
-    number: int
-
-
-@dataclass(frozen=True)
 class Limits:
     """Rising limits by metric, in SI; units: of the page that shows them."""
 
@@ -47,18 +39,18 @@ class Limits:
         """Return the limits of a measure in its unit; () without any."""
         return tuple(measure.factor * one for one in self.by_metric.get(measure.variable, ()))
 
-    def zone(self, measure: Measure, value: float, bar: float) -> Zone | None:
-        """Return the zone of a value with its error bar, in the measure's unit.
+    def zone(self, measure: Measure, value: float, bar: float) -> str:
+        """Return the zone of a value with its error bar, in the measure's unit, such as B.
 
-        A value on a limit is in the zone above it. None without limits, without a value, and where
-        the bar is not known.
+        A value on a limit is in the zone above it; A/B: the error bar holds their limit. "" without
+        limits, without a value, and where the bar is not known.
         """
         limits = self.of(measure)
         if not limits or math.isnan(value) or math.isinf(bar):
-            return None
+            return ""
         bar = 0.0 if math.isnan(bar) else bar
-        low, high = (sum(end >= one for one in limits) for end in (value - bar, value + bar))
-        return Zone(ZONES[low] + (f"/{ZONES[high]}" if high > low else ""), high)
+        ends = (sum(end >= one for one in limits) for end in (value - bar, value + bar))
+        return "/".join(dict.fromkeys(ZONES[end] for end in ends))
 
     def words(self, shown: Iterable[Measure]) -> list[str]:
         """Return a sentence on the zones of each metric that is shown."""

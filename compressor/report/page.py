@@ -28,14 +28,14 @@ from compressor.report.limits import NO_LIMITS, Limits
 class Cell:
     """A cell: numbers stand to the right, words to the left, code in its own letters.
 
-    `value`: by what a column is sorted, where that is not the text; `zone`: 1 for A, 2 for B and so
-    on, of a metric that has limits; 0 of others.
+    `value`: by what a column is sorted, where that is not the text; `zone`: A to D, the worse of
+    two, of a metric that has limits; "" of others.
     """
 
     text: str
     kind: Literal["word", "number", "code"] = "word"
     value: float | None = None
-    zone: int = 0
+    zone: str = ""
 
 
 @dataclass(frozen=True)
@@ -85,9 +85,7 @@ def measured_cell(measure: Measure, value: float, bar: float, limits: Limits = N
     text = unbroken(format_measure(measure, value, bar))
     zone = limits.zone(measure, value, bar)
     known = None if math.isnan(value) else value
-    if zone is None:
-        return Cell(text, "number", known)
-    return Cell(f"{text} {zone.name}", "number", known, zone.number + 1)
+    return Cell(f"{text} {zone}".rstrip(), "number", known, zone[-1:])
 
 
 def value_cell(value: Any) -> Cell:

@@ -46,7 +46,8 @@ def compare_healthy(
     force = np.full(has_clearance.size, np.nan)
     for measure in measures_of(FORCE, data):
         worn = is_worn.sel(joint=measure.joint).values.ravel()
-        force = np.fmax(force, np.where(worn, known_values(measure, data), np.nan))
+        known = measure.known(measure.of(data), measure.bar(data)).ravel()
+        force = np.fmax(force, np.where(worn, known, np.nan))
     jobs = np.flatnonzero(has_clearance)
     ranked = jobs[np.argsort(-force[jobs], kind="stable")]  # what is not known comes last
     rows = stored.find([*map(str, data["key"].values.ravel())]).tolist()
@@ -69,12 +70,6 @@ def compare_healthy(
 def measures_of(name: str, data: xr.Dataset) -> list[Measure]:
     """Return the measures of a metric, of each joint or axis; none where the data have it not."""
     return [one for one in MEASURES if one.variable == name and name in data]
-
-
-def known_values(measure: Measure, data: xr.Dataset) -> np.ndarray:
-    """Return a measure of a study's jobs in a row, nan where its error bar is as long as it."""
-    values, bars = measure.of(data), measure.bar(data)
-    return np.where(np.isnan(bars) | (bars < values), values, np.nan).ravel()
 
 
 def differing_in_clearance(data: xr.Dataset, place: int) -> list[int]:

@@ -56,6 +56,16 @@ class Measure:
         name = f"{self.variable}_error"
         return self.in_unit(data, name) if name in data else self.of(data) * math.nan
 
+    def known(self, values: np.ndarray, bars: np.ndarray) -> np.ndarray:
+        """Return values of the measure, nan where one is not known within its error bar.
+
+        A chaotic motion's greatest value is not.
+        """
+        good = np.isnan(bars) | np.isfinite(bars)
+        if self.is_relative:
+            good &= ~(bars >= abs(values)) | (bars == 0.0)
+        return np.where(good, values, math.nan)
+
     def in_unit(self, data: xr.Dataset, name: str) -> np.ndarray:
         """Return a variable of the metric in the unit; 0 of rounding beside the other joint."""
         found = data.variables[name]  # by numpy: xarray's own steps take ten times as long
@@ -215,15 +225,8 @@ class PlottedSweep:
         return self.data["regime"].values == "chaotic"
 
     def known(self, measure: Measure) -> np.ndarray:
-        """Return a measure of the jobs, nan where it is not known within its error bar.
-
-        A chaotic motion's greatest value is not.
-        """
-        values, bars = measure.of(self.data), measure.bar(self.data)
-        good = np.isnan(bars) | np.isfinite(bars)
-        if measure.is_relative:
-            good &= ~(bars >= abs(values)) | (bars == 0.0)
-        return np.where(good, values, math.nan)
+        """Return a measure of the jobs, as `Measure.known`."""
+        return measure.known(measure.of(self.data), measure.bar(self.data))
 
     def at(self, axis: int, number: int) -> "PlottedSweep":
         """Return the part of a grid at one value of an axis."""
