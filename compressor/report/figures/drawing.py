@@ -255,18 +255,10 @@ SHARED = ("range", "type", "dtick", "tickvals", "ticktext", "nticks", "showgrid"
 
 
 class Drawing:
-    """A grid of panels that becomes a figure; title: above all, in lines."""
+    """A grid of panels that becomes a figure; `drawn`: so far."""
 
     def __init__(self, panels: list[Panel]) -> None:
-        self.panels, self.drawn, self.title = panels, panels[0].figure, ""
-
-    def list_area(self, name: str, style: LineStyle) -> None:
-        """Name an area in the legend, whether one is drawn or not."""
-        self.panels[0].fill([math.nan], [math.nan], style, name)
-
-    def list_line(self, name: str, style: LineStyle) -> None:
-        """Name a line or marks in the legend, whether some are drawn or not."""
-        self.panels[0].plot([math.nan], [math.nan], style, name)
+        self.panels, self.drawn = panels, panels[0].figure
 
     def figure(self) -> go.Figure:
         """Return the figure.
@@ -282,10 +274,7 @@ class Drawing:
                 axis.update({name: first[name] for name in SHARED if first[name] is not None})
             if axis.showticklabels is False:
                 axis.title = ""
-        self.drawn.layout.update(
-            title={"text": self.title.replace("\n", "<br>")},
-            hovermode="x unified" if is_unified else "closest",
-        )
+        self.drawn.layout.hovermode = "x unified" if is_unified else "closest"
         return self.drawn
 
 

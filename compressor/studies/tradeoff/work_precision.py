@@ -206,9 +206,8 @@ def draw_work_precision(study: xr.Dataset) -> report.PlotlyFigure:
     for number, panel in enumerate(drawing.panels):
         apart = study["reference_uncertainty"].values[number].item()
         if apart > ends[0]:
-            panel.fill(*report.rectangle(np.array(sides), np.array([ends[0], apart])), DISAGREE)
-    drawing.list_line("a word of solve.accuracy", TIER)
-    drawing.list_area("the references disagree", DISAGREE)
+            area = report.rectangle(np.array(sides), np.array([ends[0], apart]))
+            panel.fill(*area, DISAGREE, "the references disagree")
     return drawing.figure()
 
 
@@ -224,7 +223,7 @@ def draw_scene(panel: report.Panel, one: xr.Dataset) -> None:
         if "auto" in one["method"].values and tier.rtol in one["rtol"].values:
             point = one.sel({"method": "auto", "rtol": tier.rtol})
             x, y = point["seconds"].item(), point["error_acceleration"].item()
-            panel.plot(x, y, TIER)
+            panel.plot(x, y, TIER, "a word of solve.accuracy")
             panel.write(word, x, y, style.BLUE, shift=(-11, -2), side="right", level="top")
 
 
