@@ -67,6 +67,8 @@ MAX_GROUPS = 4096  # whose identities are remembered
 SOUND = PerJoint(0.0, 0.0)  # a healthy clearance that no case need name
 FOLLOWING = ("gas.switching", "gas.back_pressure_MPa")  # from what else is given of a cylinder
 OWN_GAS = {key for key in (*table(), *parts_by_key()) if key.startswith("gas.")} - {*FOLLOWING}
+# what facts are read with: tests by their texts, of which many are the same
+FACT_TESTS = {needed: condition(needed) for key in FACT_KEYS for _, needed in conditions(key)}
 IN_KEY_IF_READ = {".".join(key.split(".")[:2]) for key in FACT_KEYS}
 # values that a job's key does not have, as it has none of what is not given
 AS_WITHOUT = {
@@ -182,7 +184,7 @@ stroke, 240 mm
         whole, problems, given = plain_values(values)
         case = None
         try:
-            case = adapter_of_case().validate_python(whole)
+            case = ADAPTER.validate_python(whole)
         except ValidationError as error:
             problems += problems_of(error, whole, table(), describe_wrong)
             if any(one["type"] != "value_error" or len(one["loc"]) for one in error.errors()):
@@ -398,10 +400,7 @@ def require_case(value: Any) -> Case:
     )
 
 
-@cache
-def adapter_of_case() -> TypeAdapter[Case]:
-    """Return what checks the values of a case."""
-    return TypeAdapter(Case)
+ADAPTER = TypeAdapter(Case)  # which checks the values of a case
 
 
 def plain_values(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem], frozenset[str]]:
@@ -492,21 +491,15 @@ def _text_of_group(name: str, group: Any) -> str:
 
 def _facts_read(case: Case) -> dict[str, Any]:
     """Return the facts that a case has and reads."""
-    holds = tuple([test(case) for test in _fact_conditions().values()])
+    holds = tuple([test(case) for test in FACT_TESTS.values()])
     found = {key: get(case) for key, get in _facts_where(holds)}
     return {key: value for key, value in found.items() if value not in (None, AS_WITHOUT.get(key))}
 
 
 @cache
-def _fact_conditions() -> dict[str, Callable[[Any], bool]]:
-    """Return the tests of what facts are read with, by their texts: many need the same."""
-    return {needed: condition(needed) for key in FACT_KEYS for _, needed in conditions(key)}
-
-
-@cache
 def _facts_where(holds: tuple[bool, ...]) -> list[tuple[str, Callable[[Any], Any]]]:
     """Return the facts that are read where these conditions hold, and how a case gives each."""
-    found = dict(zip(_fact_conditions(), holds, strict=True))
+    found = dict(zip(FACT_TESTS, holds, strict=True))
     return [
         (key, getter(key))
         for key in FACT_KEYS
