@@ -1,6 +1,6 @@
 """Run jobs in worker processes: one that crashes, hangs or eats memory costs itself only.
 
-joblib gives threads, their queue and their results. Each thread has a process of its own, with a
+joblib gives threads, their queue and their results. Each thread uses one process at a time, with a
 pipe that breaks if that dies: so a death names its own job, and costs no other process. All are
 copies of one process, the loader, that has loaded the equations, which takes two seconds, and runs
 no job; should that die, all are made anew.

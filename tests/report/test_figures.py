@@ -1,5 +1,6 @@
 """The figures: every line is the stored series, every panel can be read, captions are right."""
 
+import csv
 import math
 import re
 from pathlib import Path
@@ -11,7 +12,7 @@ import pytest
 from compressor.analysis import CLEARANCES, FAULTS, Cam, Cycle, label, paper_cases
 from compressor.cases.case import Case
 from compressor.report.figures import FIGURES, pictures
-from compressor.report.figures.drawing import panels_of
+from compressor.report.figures.drawing import as_csv, panels_of
 from compressor.report.figures.job import FILM, draw_analyst, draw_orbits
 from compressor.report.figures.rows import SweptRow, draw_cycles
 from compressor.report.figures.table import spell
@@ -151,12 +152,11 @@ def test_cam(drawn):
     assert np.hypot(*circle) == pytest.approx(200)
     np.testing.assert_allclose(path, np.multiply(cam.contour(turn, 0.2), 1000), atol=1e-9)
     assert contour.y.scaleanchor == "x"
-    before, after = (one for one in follower.traces if one.name == "as printed, Eq. 10")
+    (printed,) = (one for one in follower.traces if one.name == "as printed, Eq. 10")
     (closed,) = (one for one in follower.traces if one.name == "closed cam, as simulated")
     np.testing.assert_allclose(closed.y, cam.follower(turn) * 1000, atol=1e-9)
-    for printed in (before, after):
-        angle = np.radians(printed.x)
-        np.testing.assert_allclose(printed.y, cam.printed_follower(angle) * 1000)
+    np.testing.assert_allclose(printed.y, cam.printed_follower(np.radians(printed.x)) * 1000)
+    assert np.isnan(printed.y).sum() == 1  # at the jump
 
 
 @pytest.mark.parametrize("number", [6, 8, 9, 11, 12, 14, 15, 16])
@@ -188,6 +188,8 @@ def test_axes_name_their_units(drawn, number):
     for panel in panels:
         has_label = panel.y.title.text or "enlarged" in panel.title
         assert has_label or number in (10, 13)  # these share their axis
+    heads = next(csv.reader(as_csv(drawn[number].figure).splitlines()))
+    assert len({*heads}) == len(heads)  # two columns were both "0.2 mm: 0.2 mm: force (kN)"
 
 
 @pytest.mark.parametrize("number", [3, 4, 6, 7, 10, 14, 15])  # one of each arrangement

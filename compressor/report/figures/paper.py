@@ -16,6 +16,7 @@ from compressor.units import Units
 
 SERIES = ("displacement", "velocity", "acceleration")
 WORDS = "displacement, velocity and acceleration"
+PEAKS = " Greatest values are of all settled revolutions, also between the samples that are drawn."
 AT = f"{', '.join(f'{c:g}' for c in analysis.CLEARANCES)} mm"
 
 
@@ -87,6 +88,7 @@ def draw_fault_response(runs: curves.Runs, fault: str, units: Units = "usual") -
     sentence = (
         "Left, the last revolution, acceleration in a row a clearance, with the motion without "
         "clearance dotted; right, the part in the black rectangles, where the curves differ most."
+        f"{PEAKS}"
     )
     worn = [runs[analysis.label(fault, c)] for c in analysis.CLEARANCES]
     away = 100.0 * np.max([differences_from_ideal(run) for run in worn], axis=0)
@@ -184,15 +186,15 @@ def draw_contact_force(
         enlarged = panels[rows.start, 1]
         curves.plot_rows(panels[rows, 0], drawn, quantity)
         curves.plot_enlarged(panels[rows, 0], enlarged, drawn, quantity, part)
-        top = panels[rows, 0][0]
-        top.title = f"({letter}) {top.title}"
+        for panel in panels[rows, 0]:
+            panel.title = f"({letter}) {panel.title}"
         enlarged.title = "enlarged"
         enlarged.y.title = ""
     sentence = (
         "Force on the rod: (a) along the cylinder, positive away from the crank, and (b) vertical, "
         "on a scale of its own. Left, the last revolution, a row a clearance; right, the part in "
         f"the black rectangles, where the horizontal forces at the {analysis.SPOKEN[chosen_by]} "
-        "differ most."
+        f"differ most.{PEAKS}"
     )
     numbers = []
     for axis, words in (("x", "along the cylinder"), ("y", "across it")):
@@ -331,10 +333,10 @@ def draw_follower(panel: Panel, cam: analysis.Cam, angles: np.ndarray) -> None:
     panel.label("x", "cam angle (°)")
     panel.label("y", "s ({})", "mm")
     fall = cam.gas_corners[2]
-    before, after = angles[angles < fall], np.append(fall, angles[angles >= fall])
-    for part in (before, after):
-        s = cam.printed_follower(part) * 1e3
-        panel.plot(np.degrees(part), s, PRINTED, "as printed, Eq. 10")
+    jump = np.array([math.nan, fall])  # which no line crosses
+    parts = np.concatenate([angles[angles < fall], jump, angles[angles >= fall]])
+    s = cam.printed_follower(parts) * 1e3
+    panel.plot(np.degrees(parts), s, PRINTED, "as printed, Eq. 10")
     s = cam.follower(angles) * 1e3
     panel.plot(np.degrees(angles), s, CLOSED, "closed cam, as simulated")
     height, left = (float(cam.printed_follower(turn)) * 1e3 for turn in (math.pi, fall))
