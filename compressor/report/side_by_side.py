@@ -18,7 +18,6 @@ from compressor.units import Units
 
 MAX_WORN = 10  # jobs, and the worst, that stand beside the machine without clearance
 CLEARANCES = {"clearance_mm", *stands_for("clearance_mm")}
-MAX_TRIED = 50  # jobs among which the worst with clearance is looked for
 FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its meaning
 
 
@@ -36,7 +35,7 @@ def compare_healthy(
     """Return the worn job of the greatest contact force beside its machine without clearance.
 
     And jobs of the study that differ from it in clearances alone, by clearance. None where no job
-    that is ok has clearance, this version knows the case of none, or the machine without clearance
+    that is ok has clearance, this version does not know its case, or the machine without clearance
     fails. data: of `open_study`.
     """
     if "max_penetration" not in data:
@@ -49,22 +48,23 @@ def compare_healthy(
         known = measure.known(measure.of(data), measure.bar(data)).ravel()
         force = np.fmax(force, np.where(worn, known, np.nan))
     jobs = np.flatnonzero(has_clearance)
-    ranked = jobs[np.argsort(-force[jobs], kind="stable")]  # what is not known comes last
-    rows = stored.find([*map(str, data["key"].values.ravel())]).tolist()
-    for place in ranked[:MAX_TRIED].tolist():
-        if case := stored.case_at(rows[place]):
-            alike = [n for n in differing_in_clearance(data, place) if has_clearance[n]]
-            some = {place, *(alike[n] for n in thin_places(len(alike), MAX_WORN))}
-            places = [n for n in alike if n in some]
-            words = "this job"
-            if len(alike) > 1:
-                count = "all" if len(places) == len(alike) else f"{len(places)} of {len(alike)}"
-                words = f"{count} jobs that differ in clearances alone, from the least on"
-            if len(alike) > 1 and force[place] > 0.0:
-                at = name_jobs(data)[place]
-                words += f"; the greatest contact force in a worn joint is at {at}"
-            return _compare(data, case, places, words, units)
-    return None
+    if not jobs.size:
+        return None
+    place = int(jobs[np.argmax(np.nan_to_num(force[jobs], nan=-1.0))])  # of known ones, if any
+    case = stored.case_at(stored.find([str(data["key"].values.flat[place])])[0])
+    if case is None:
+        return None
+    alike = [n for n in differing_in_clearance(data, place) if has_clearance[n]]
+    some = {place, *(alike[n] for n in thin_places(len(alike), MAX_WORN))}
+    places = [n for n in alike if n in some]
+    words = "this job"
+    if len(alike) > 1:
+        count = "all" if len(places) == len(alike) else f"{len(places)} of {len(alike)}"
+        words = f"{count} jobs that differ in clearances alone, from the least on"
+    if len(alike) > 1 and force[place] > 0.0:
+        at = name_jobs(data)[place]
+        words += f"; the greatest contact force in a worn joint is at {at}"
+    return _compare(data, case, places, words, units)
 
 
 def measures_of(name: str, data: xr.Dataset) -> list[Measure]:

@@ -85,35 +85,31 @@ def draw_cycles(rows: Sequence[SweptRow], title: str, units: Units = "usual") ->
     reversals = [one.reversals if one else () for one in found]
     has_cam = any(event.startswith("cam") for one in found if one for _, event in one.events)
     corner = "corner of the load" if has_cam else "a valve opens or closes"
-    for name, shape, color, angles in (
+    for name, shape, color, marked in (
         (corner, "triangle-down", "#ffffff", corners),
         ("rod load changes its side", "square", style.RED, reversals),
     ):
-        if not any(len(some) for some in angles):
-            continue
-        x = np.array([at for some in angles for at in some])
-        y = np.array([float(n) for n, some in enumerate(angles) for _ in some])
-        image.plot(x, y, style.mark(color, shape, 4, edge=style.BLACK), name)
+        places = np.array([(at, n) for n, some in enumerate(marked) for at in some], float)
+        if places.size:
+            x, y = places.T
+            image.plot(x, y, style.mark(color, shape, 4, edge=style.BLACK), name)
     show_turn(image, 90.0)
-    peaks = np.nanmax(np.where(np.isnan(table), -1.0, table), axis=1)
-    peaks = np.where(peaks < 0, np.nan, peaks)
     sensed = any(one.is_sensed for one in found if one)
     kind = "sensor's record" if sensed else "acceleration of the crosshead"
     sentence = (
         f"The greatest magnitude of the {kind} in each degree of the last settled revolution, "
         f"{describe_rows(rows, title)}.{left_out(rows)}"
     )
-    loud = np.array([loudest(one)[0] if one else np.nan for one in found])
-    at = next(loudest(one)[1] for one, peak in zip(found, loud, strict=True)
-              if one and peak == np.nanmax(loud))  # fmt: skip
+    loud, angles = np.array([loudest(one) if one else (np.nan, np.nan) for one in found]).T
+    most = np.nanargmax(loud)
     counts = [len(one.reversals) for one in found if one]
     numbers = [
         *spell_ends("greatest magnitude", loud, rows, "m/s²", units),
-        ("the greatest comes at", f"{at:.0f}°, {spell(G * np.nanmax(loud), 'g')}"),
+        ("the greatest comes at", f"{angles[most]:.0f}°, {spell(G * loud[most], 'g')}"),
         ("changes of the rod load's side a revolution", ", ".join(map(str, sorted({*counts})))),
     ]
     return DrawnFigure(
-        finish_map(drawing, peaks, "peak ({})", "m/s²", 1.08 * top), sentence, numbers
+        finish_map(drawing, loud, "peak ({})", "m/s²", 1.08 * top), sentence, numbers
     )
 
 

@@ -87,14 +87,11 @@ def shown_variables(name: str) -> Iterator[Measure]:
     metric = BARRED[name]
     if metric.shown and not metric.dims:
         yield Measure(name, *metric.shown)
-    elif metric.shown and metric.dims == ("axis",):
-        title, unit, factor = metric.shown
-        for axis in AXES:
-            yield Measure(name, f"{title}, {axis}", unit, factor, axis=axis)
     elif metric.shown:
-        title, unit, factor = metric.shown
-        for joint in JOINTS:
-            yield Measure(name, f"{title}, {joint.replace('_', ' ')}", unit, factor, joint)
+        (dim,), (title, unit, factor) = metric.dims, metric.shown
+        for part in AXES if dim == "axis" else JOINTS:
+            words = f"{title}, {part.replace('_', ' ')}"
+            yield Measure(name, words, unit, factor, **{dim: part})
 
 
 MEASURES = tuple(measure for name in BARRED for measure in shown_variables(name))
