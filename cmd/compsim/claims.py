@@ -50,9 +50,8 @@ def claims(study, folder, quiet) -> int:
     drawn = draw(found, effects)
     if drawn:
         figure, sentence = drawn
-        for kind in (".png", ".svg"):
-            write_figure(path.with_suffix(kind), figure)
-        screen.print_text(f"{path.with_suffix('.png')}: {sentence}")
+        picture = write_figure(path.with_suffix(".png"), figure)
+        screen.print_text(f"{picture}: {sentence}")
     failed = [*list_failed(found)]
     if not failed:
         return screen.DONE

@@ -8,7 +8,7 @@ import click
 from compsim import options, screen
 from compsim.progress import ProgressReporter
 
-KINDS = (".png", ".svg", ".csv")
+KINDS = (".png", ".csv")
 
 
 @click.command()
@@ -16,7 +16,7 @@ KINDS = (".png", ".svg", ".csv")
 @click.argument("names", nargs=-1, required=True, metavar="JOB|STUDY...")
 @options.results
 @options.record
-@options.output("Draw this figure, .png or .svg, or write its numbers as .csv.", type=options.FILE)
+@options.output("Draw this figure, .png, or write its numbers as .csv.", type=options.FILE)
 @options.as_json
 @options.quiet
 def compare(record, names, folder, hints, output, as_json, quiet) -> int:

@@ -45,6 +45,6 @@ def tradeoff(configs, folder, overrides, quiet) -> int:
         screen.print_text(*list_fastest(found))
         path = Path(folder, "tradeoff", study.name)
         figure = draw_work_precision(found)
-        paths = [write_figure(path.with_suffix(kind), figure) for kind in (".png", ".svg")]
-        screen.print_text(*map(str, (*paths, write_dataset(path.with_suffix(".nc"), found))))
+        picture = write_figure(path.with_suffix(".png"), figure)
+        screen.print_text(str(picture), str(write_dataset(path.with_suffix(".nc"), found)))
     return screen.DONE

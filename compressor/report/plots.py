@@ -58,9 +58,9 @@ def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tup
 
 
 def write_figure(path: Path, figure: go.Figure) -> Path:
-    """Write a figure as its path ends, .png, .svg or .csv; return the path. Raises StoreError."""
-    kind = path.suffix[1:]
-    store.publish(path, as_csv(figure).encode() if kind == "csv" else render(figure, kind))
+    """Write a figure as its path ends, .png or .csv; return the path. Raises StoreError."""
+    is_table = path.suffix == ".csv"
+    store.publish(path, as_csv(figure).encode() if is_table else render(figure))
     return path
 
 

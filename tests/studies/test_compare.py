@@ -88,9 +88,9 @@ def test_numbers_say_how_far_a_record_is_off(folder, compare, tmp_path):
 
 
 def test_an_exported_record_is_its_job(folder, compare, export):
-    picture = folder[0] / "x.svg"
+    picture = folder[0] / "x.png"
     record, _, job, file, caption = compare(export, folder[1], "-o", picture).splitlines()
-    assert picture.read_bytes().startswith(b"<?xml")
+    assert picture.read_bytes().startswith(b"\x89PNG")
     assert (file, caption.strip()) == (str(picture), CAPTION)
     assert record.endswith("record.csv: 9 revolutions at 500 rpm, 25600 Hz, 5.153 m/s2 rms up to "
                            "order 1200")  # fmt: skip
@@ -105,7 +105,7 @@ def test_mistakes_are_named(folder, compare, tmp_path):
     for words, told in (
         ([folder[1], "othrs"], "did you mean others?"),
         ([folder[1], "deaf"], "none of the 1 jobs has a sensor's record of two revolutions"),
-        ([folder[1], "others", "-o", "x.pdf"], "-o x.pdf: end the name in .png, .svg, .csv"),
+        ([folder[1], "others", "-o", "x.pdf"], "-o x.pdf: end the name in .png, .csv"),
     ):
         assert told in compare(*words, code=2)
     assert "has no sensor's record" in compare(folder[3], "others", code=5)
