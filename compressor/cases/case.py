@@ -13,7 +13,8 @@ from functools import cache, cached_property, lru_cache, partial
 from typing import Any
 
 import yaml
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError, model_validator
+from pydantic_core import ArgsKwargs
 
 from compressor.cases.card import ATMOSPHERE_MPA
 from compressor.cases.checks import (
@@ -122,6 +123,9 @@ class Case:
         ...
     compressor.cases.parameter.CaseError: spring.stroke_mm: 300 mm must be less than the piston's \
 stroke, 240 mm
+
+    What was filled in stays, such as a uniform rod's inertia beside another mass; None fills it in
+    anew.
     """
 
     name: str = TOP["name"]
@@ -186,13 +190,32 @@ stroke, 240 mm
         try:
             case = ADAPTER.validate_python(whole)
         except ValidationError as error:
-            problems += problems_of(error, whole, table(), describe_wrong)
+            problems += cls._problems_of(error, whole)
             if any(one["type"] != "value_error" or len(one["loc"]) for one in error.errors()):
                 raise CaseError(name_as_written(whole, problems)) from None
         problems += given_conflicts(str(whole.get("joint", "none")), given)
         if case is None or problems:
             raise CaseError(name_as_written(whole, problems), is_misfit=True)
         return case
+
+    @staticmethod
+    def _problems_of(error: ValidationError, values: Mapping[str, Any]) -> list[Problem]:
+        """Return what pydantic has found wrong with nested values, in our words."""
+        return problems_of(error, values, table(), describe_wrong)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _require_clearances(cls, values: Any) -> Any:
+        """Return the values; those of Python give the clearance of each joint with play."""
+        if isinstance(values, ArgsKwargs):
+            found = {"joint": "none", "clearance_mm": None} | (values.kwargs or {})
+            play, given = found["clearance_mm"], find_given({"clearance_mm": found["clearance_mm"]})
+            for one in ("none", *JOINTS) if isinstance(play, PerJoint) else ():
+                if play is play_of(one, play.at(one)):  # which fills in 0
+                    given = frozenset({f"clearance_mm.{one}"})
+            if problems := given_conflicts(str(found["joint"]), given):
+                raise CaseError(problems)
+        return values
 
     def __post_init__(self) -> None:
         """Fill in what depends on other groups; what needs a clearance goes without.
@@ -203,8 +226,8 @@ stroke, 240 mm
         if self.guide:
             values["guide"] = fill_guide(self.guide, self.machine.reciprocating_mass_kg)
         if self.joint != "both":
-            gaps = {one: self.clearance_mm.at(one) if one == self.joint else 0.0 for one in JOINTS}
-            values["clearance_mm"] = PerJoint(**gaps)
+            gap = 0.0 if self.joint == "none" else self.clearance_mm.at(self.joint)
+            values["clearance_mm"] = play_of(self.joint, gap)
         if self.joint == "none":  # which has no bore that oil fills, or that wears
             values["lubricant"] = values["wear"] = None
         if self.wear:
@@ -389,6 +412,15 @@ stroke, 240 mm
         """Return what is stored of a case: `name`, `case` (JSON), `key` and `physics_key`."""
         text = json.dumps(self.values(), sort_keys=True)
         return {"name": self.name, "case": text, "key": self.key, "physics_key": self.physics_key}
+
+
+@lru_cache(MAX_GROUPS)
+def play_of(joint: str, clearance: float) -> PerJoint[float]:
+    """Return the clearances of a case whose `joint` is this one or none; equal ones are one object.
+
+    By that `dataclasses.replace` tells the 0 of the other joint from one that is given.
+    """
+    return PerJoint(**{one: clearance if one == joint else 0.0 for one in JOINTS})
 
 
 def require_case(value: Any) -> Case:

@@ -505,13 +505,13 @@ def make_group(cls: type[Group]) -> type[Group]:
             cls.__annotations__[name] = annotation_of_field(name, item, own[name])
     made: Any = pydantic.dataclasses.dataclass(frozen=True, config=ConfigDict(extra="forbid"))(cls)
     rows = {row.key: row for item in fields(made) for row in rows_of(item.name, item)}
-    validate = made.__init__
+    validate, tell = made.__init__, getattr(made, "_problems_of", partial(problems_of, rows=rows))
 
     def __init__(self: Any, *args: Any, **values: Any) -> None:
         try:
             validate(self, *args, **values)
         except ValidationError as error:
-            raise CaseError(problems_of(error, values, rows)) from None
+            raise CaseError(tell(error, values)) from None
 
     made.__init__ = __init__
     made.__annotations__ = own
