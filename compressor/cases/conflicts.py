@@ -180,6 +180,7 @@ OF_CORNERS = (
 MIN_SAMPLES = 4  # of a sensor, in a revolution
 MAX_MOVING_SHARE = 0.1  # the moving parts' share of a body's mass
 MAX_BACK_ACTION = 0.3  # of a force that a body's motion may change at the speed's first two orders
+MAX_STAGE_RATIO = 11.0  # of a stage's pressures; more may be bar for MPa
 MAX_REVOLUTIONS_TOLD = 1e9  # revolutions, more than any run has
 SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 
@@ -282,14 +283,19 @@ def cycle_rules(case: Case) -> Rules:
         yield "gas.discharge_MPa", text
     elif gas.switching == "exact":
         suction, discharge = gas.open_pressures
-        growth = (discharge / suction) ** (1 / gas.exponent)
+        growth, told = (discharge / suction) ** (1 / gas.exponent), ""
+        if gas.discharge_MPa > MAX_STAGE_RATIO * gas.suction_MPa:
+            told = (
+                f"; suction_MPa {gas.suction_MPa:g} and discharge_MPa {gas.discharge_MPa:g} are "
+                "absolute and in MPa: 7 bar is 0.7"
+            )
         for end in gas.compressing_ends:
             clearance = gas.clearance(end, stroke)
             if clearance * growth >= stroke + clearance:
                 yield (
                     gas.clearance_key(end),
                     f"the gas left at the {end} never expands to the suction pressure; "
-                    "lower it, or the pressure ratio",
+                    f"lower it, or the pressure ratio{told}",
                 )
     elif gas.is_cylinder or any(value_of(case, key) != table()[key].default for key in OF_CORNERS):
         yield (
