@@ -163,7 +163,11 @@ def expand_synonyms(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Pro
 
 def in_our_unit(name: str, value: Any, allowed: list[str]) -> str:
     """Return the hint at a key in another unit, such as "; write suction_MPa: 0.2"; or ""."""
-    stem, _, unit = name.rpartition("_")
+    words = name.split("_")
+    if "gauge" in words:  # as in suction_gauge_bar, which is in barg
+        words.remove("gauge")
+        words[-1:] = [f"{word}g" for word in words[-1:]]
+    stem, _, unit = "_".join(words).rpartition("_")
     if unit not in OTHER_UNITS or stem.endswith("_per"):
         return ""
     for known in (stem, stem.removesuffix("_pressure")):

@@ -35,6 +35,7 @@ from compressor.program import MAX_WORD_LENGTH, CompsimError, did_you_mean
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
 NAME = r"^[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}$"
 NO_VALUE = "has no value; leave the key out to get its default"
+ABSOLUTE = f"pressures are absolute: add {ATMOSPHERE_MPA:g}, the atmosphere's, to a gauge's"
 # a number that is written as text, with a decimal comma or a unit
 AS_NUMBER = re.compile(
     r"\s*([-+]?(?:\d{1,2},\d+|\d+(?:\.\d+)?)(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.ASCII
@@ -59,6 +60,7 @@ ENDS = {end: unit for unit, end in WRITTEN.items()}
 # other units that people write -> that of our keys, and what one of it is there
 OTHER_UNITS = {
     **{f"{unit}{end}": ("MPa", IN_MPA[unit]) for unit in ("bar", "psi") for end in ("", "a", "g")},
+    "MPag": ("MPa", 1.0), "kPag": ("MPa", IN_MPA["kpa"]),
     "kPa": ("MPa", IN_MPA["kpa"]), "Pa": ("MPa", 1e-6), "um": ("mm", 1e-3), "cm": ("mm", 10.0),
     "m": ("mm", 1e3), "in": ("mm", 25.4), "inch": ("mm", 25.4), "mil": ("mm", 0.0254),
     "mils": ("mm", 0.0254), "kN": ("N", 1e3), "g": ("m/s2", 9.80665), "lb": ("kg", 0.45359237),
@@ -195,7 +197,7 @@ def to_si(value: float, unit: str) -> float:
 def convert_other(value: Any, unit: str) -> str:
     """Return what to write of a value in a unit of `OTHER_UNITS`."""
     ours, factor = OTHER_UNITS[unit]
-    is_gauge, note = unit in ("barg", "psig"), ""
+    is_gauge, note = ours == "MPa" and unit.endswith("g"), ""
     if is_gauge:
         note = f", absolute: with the atmosphere's {ATMOSPHERE_MPA:g}"
     elif ours == "MPa" and unit not in ("bara", "psia"):
@@ -295,7 +297,8 @@ class Parameter:
             if not math.isfinite(to_python(value)):
                 return f"must be finite: {self._refuse(value)}"
             if self.kind == "number" or value == int(value):
-                return f"{value:g} is outside {self.span} {self.unit}".rstrip()
+                told = f"; {ABSOLUTE}" * (self.unit == "MPa" and value <= 0)
+                return f"{value:g} is outside {self.span} {self.unit}".rstrip() + told
         if self.kind != "materials":
             return self._refuse(value, value)
         pair = value if isinstance(value, tuple | list) and len(value) == 2 else ()
