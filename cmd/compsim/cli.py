@@ -155,6 +155,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def report_error(error: Exception) -> int:
     """Report what went wrong and return the exit code; a traceback only of internal errors."""
+    if isinstance(error.__cause__ or error, FileNotFoundError) and not is_somewhere():
+        screen.say("compsim: the current folder was removed; cd to one that is there")
+        return screen.USAGE
     if isinstance(error, CompsimError):
         screen.say(f"{error.prefix}{error}")
         return error.exit_code
@@ -173,3 +176,12 @@ def report_error(error: Exception) -> int:
     screen.say("".join(traceback.format_exception(error)).rstrip())
     screen.say("compsim: internal error: please report it, with the lines above")
     return screen.INTERNAL
+
+
+def is_somewhere() -> bool:
+    """Return whether the current folder is there still."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return False
+    return True

@@ -72,6 +72,14 @@ def test_a_path_that_cannot_be_read_is_named_in_one_line(capsys):
     assert "Traceback" in capsys.readouterr().err
 
 
+def test_a_current_folder_that_was_removed_is_told_in_one_line(tmp_path, monkeypatch, compsim):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    said = compsim("init", "machine", code=2).err
+    assert said == "compsim: the current folder was removed; cd to one that is there\n"
+
+
 def test_ctrl_c_amid_an_import_leaves_no_traceback(tmp_path):
     begun = tmp_path / "begun"
     (tmp_path / "click.py").write_text(
