@@ -28,7 +28,7 @@ from pydantic import (
 )
 
 from compressor.cases.card import ATMOSPHERE_MPA, IN_MPA, CardError, mark_card
-from compressor.cases.yaml_reader import Problem, is_number
+from compressor.cases.yaml_reader import Problem, is_number, read_comma
 from compressor.metrics import METRICS
 from compressor.program import MAX_WORD_LENGTH, CompsimError, did_you_mean
 
@@ -37,9 +37,7 @@ NAME = r"^[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}$"
 NO_VALUE = "has no value; leave the key out to get its default"
 ABSOLUTE = f"pressures are absolute: add {ATMOSPHERE_MPA:g}, the atmosphere's, to a gauge's"
 # a number that is written as text, with a decimal comma or a unit
-AS_NUMBER = re.compile(
-    r"\s*([-+]?(?:\d{1,2},\d+|\d+(?:\.\d+)?)(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.ASCII
-)
+AS_NUMBER = re.compile(r"\s*([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.ASCII)
 
 # case-file unit -> numerator and denominator of its SI value
 UNITS = {
@@ -331,14 +329,15 @@ class Parameter:
         number = AS_NUMBER.fullmatch(word) if self.is_number else None
         if not number:
             return message
-        plain = number[1].replace(",", ".")
+        plain, (whole, comma, behind) = number[1].replace(",", "."), number[1].partition(",")
+        written = read_comma(whole, behind) if comma else plain
         if number[2].startswith(","):
             return f"{message}; several values are a list: write [{word}]"
         if OTHER_UNITS.get(number[2], ("none",))[0] == self.unit:
             return f"{message}; write {convert_other(float(plain), number[2])}"
         if number[2] not in ("", self.unit):
             return f"{message}; write a number alone" + (self.unit and f", in {self.unit}")
-        return f"{message}; write {plain}"
+        return f"{message}; write {written}"
 
 
 def join_with_or(words: Sequence[str]) -> str:

@@ -22,7 +22,7 @@ START = "compsim init writes a case file to start from"
 MAX_BYTES = 1 << 20
 
 DECIMALS = re.compile(r"0\d+")  # behind a decimal comma, as in [0,05]
-DECIMAL_COMMA = "a decimal comma? write {}.{}; commas separate values"
+DECIMAL_COMMA = "a comma in a number? write {}; commas separate values"
 NO_LIST = "several values are a list: write [{}, {}]"
 NULLS = {"", "~", "null", "Null", "NULL"}
 BOOLEANS = {"true": True, "True": True, "TRUE": True}
@@ -186,8 +186,10 @@ class _Reader:
             if not isinstance(name, str) or not name or not name.isprintable():
                 self.note(name_node, path, "a key must be plain text")
             elif is_number(last) and is_number(resolve_scalar(name)) and inner.value == "":
-                told = DECIMAL_COMMA if apart == 1 and name.isdecimal() else NO_LIST
-                self.note(name_node, (*path, [*found][-1]), told.format(last, name))
+                told = NO_LIST.format(last, name)
+                if apart == 1 and name.isdecimal() and isinstance(last, int):
+                    told = DECIMAL_COMMA.format(read_comma(str(last), name))
+                self.note(name_node, (*path, [*found][-1]), told)
             elif name in found:
                 first = self.places[whole][0]
                 line = f" at line {first.line}" if first.line else ""
@@ -202,7 +204,7 @@ class _Reader:
         for number, item in enumerate(node.value):
             text = item.value if isinstance(item, yaml.ScalarNode) and not item.style else ""
             if found and DECIMALS.fullmatch(text):
-                self.note(item, path, DECIMAL_COMMA.format(found[-1], text))
+                self.note(item, path, DECIMAL_COMMA.format(read_comma(str(found[-1]), text)))
             found.append(self.plain(item, (*path, number), self.place(item)))
         return found
 
@@ -252,6 +254,20 @@ KEY = re.compile(r"\s*[A-Za-z]\w*\s*:(\s|$)")
 def _place_after(path: str, before: str) -> Place:
     """Return the place that follows the text `before`."""
     return Place(path, before.count("\n") + 1, len(before) - before.rfind("\n"))
+
+
+def read_comma(whole: str, behind: str) -> str:
+    """Return what to write of a number before and behind a comma, in its likely readings.
+
+    >>> read_comma("0", "05"), read_comma("1", "000"), read_comma("500", "5")
+    ('0.05', '1.000, or 1000 for thousands', '500.5, or [500, 5] for two values')
+    """
+    readings = [f"{whole}.{behind}"]
+    if len(behind) == 3 and behind.isdecimal() and whole.strip("+-") != "0":
+        readings.append(f"{whole}{behind} for thousands")
+    if len(whole) > 2:
+        readings.append(f"[{whole}, {behind}] for two values")
+    return ", or ".join(readings[-2:])
 
 
 def is_number(value: Any) -> bool:
