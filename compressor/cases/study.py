@@ -286,7 +286,7 @@ def _sweep(path: tuple[Any, ...], key: str, value: Any) -> Sweep:
     """Return how a value sweeps a key. Raises NoSweep where it cannot."""
     row, parts = row_of(key), stands_for(key)
     if key in outside_identity():
-        raise NoSweep("cannot be swept: it does not change what a job computes")
+        raise NoSweep("cannot be swept: it does not change what a job computes; give one value")
     if isinstance(value, dict) and FORMS.keys() & value and not (row and row.is_number):
         raise NoSweep(f"is no number, so that {next(iter(value))} cannot sweep it: give a list")
     if parts and isinstance(value, list) and any(isinstance(one, dict) for one in value):
