@@ -254,7 +254,11 @@ stroke, 240 mm
                 f"needs JSON text, such as the attribute `case` of a run, not {quote_value(text)}"
             )
             raise CaseError([Problem("", message)]) from error
-        return cls.resolve(values)
+        try:
+            return cls.resolve(values)
+        except CaseError as error:
+            message = f"a stored case is of another version ({error}): run its case file again"
+            raise CaseError([Problem("", message)]) from error
 
     def values(self) -> dict[str, Any]:
         """Return the case as plain nested values; `from_values` reads them back to an equal case.

@@ -73,6 +73,10 @@ def test_values_read_back_to_an_equal_case(values):
     case = Case.from_values(values)
     assert Case.from_values(case.values()) == case
     assert Case.from_attribute(case.attributes()["case"]) == case
+    with pytest.raises(
+        CaseError, match=r"another version \(speed: unknown.*run its case file again"
+    ):
+        Case.from_attribute('{"speed": 700}')
 
 
 @pytest.mark.parametrize(
