@@ -52,6 +52,7 @@ BORE = "bore_mm is the whole bore, piston_radius_mm half of it"
 IN_MPA = "pressures are in MPa: 1 bar is 0.1 MPa"
 OF_CARD = "its pressures are in the unit that the column's title says, gauge or absolute"
 ABSOLUTE = "pressures are absolute: gauge pressure plus the atmosphere's 0.101 MPa"
+SMALL = "bearing length and pin are too small"
 PIN = "pin_radius_mm is half of the pin's diameter"
 # Wider than usual practice, so that no real machine is remarked on; what is narrower in books
 # stands beside each. No limit of power and flow: every size is built.
@@ -111,7 +112,7 @@ USUAL = {
     # rods are sized for 30 to 70 MPa
     "piston rod, stress": Usual(
         0.0, 120.0, ("gas.suction_MPa", "gas.discharge_MPa", "gas.rod_diameter_mm"),
-        above=("gas.discharge_MPa", f"{IN_MPA}; rod_diameter_mm is the whole diameter"),
+        above=("gas.discharge_MPa", "{pressures}; rod_diameter_mm is the whole diameter"),
     ),
     # 0.15 to 0.5
     "piston rod, diameter over bore": Usual(
@@ -141,7 +142,7 @@ USUAL |= {
         # 3 to 15, of a crosshead pin up to 25
         "pressure": Usual(
             0.0, 30.0, ("machine.pin_radius_mm", "lubricant.bearing_length_mm"),
-            above=("gas.discharge_MPa", f"{IN_MPA}; or bearing length and pin are too small"),
+            above=("gas.discharge_MPa", f"{{pressures}}; or {SMALL}"),
         ),
         "length over pin": Usual(
             0.3, math.inf, ("machine.pin_radius_mm",), below=("machine.pin_radius_mm", PIN)
@@ -416,16 +417,17 @@ def _over_cases(
     if is_usual or not hint or not any(_is_own(case, usual.keys) for case in cases):
         return plain
     gas = cases[0].gas if cases[0].load == "gas" else None
+    pressures = IN_MPA
     if name in BEARING and not (gas and (gas.is_measured or _is_own(cases[0], GAS_KEYS))):
         key = "lubricant.bearing_length_mm" if cases[0].lubricant else "contact.length_mm"
-        hint = hint.rpartition("; or ")[2]
+        hint = SMALL
     if gas and gas.is_measured and key == "gas.discharge_MPa":
-        key = f"gas.indicator.{next(iter(gas.cards))}"
-        hint = hint.replace(IN_MPA, OF_CARD)
+        key, pressures = f"gas.indicator.{next(iter(gas.cards))}", OF_CARD
     if name == "rod, crank ratio" and plain.high < LONG_ROD:
         key, hint = "machine.rod_length_mm", f"it is in mm; or the stroke is too short: {STROKE}"
     range_ = f"at least {usual.low:g}" if plain.high < usual.low else f"at most {usual.high:g}"
     thing, _, quantity = name.partition(", ")
+    hint = hint.format(pressures=pressures)
     remark = f"{thing}: {quantity} {plain.value()}, where {range_} is usual; {hint}"
     return replace(plain, key=key, remark=remark)
 
