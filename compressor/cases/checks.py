@@ -23,10 +23,12 @@ from compressor.cases.parameter import (
     WRITTEN,
     Parameter,
     convert_other,
+    hint_at_part,
     quote_value,
     split_unit,
     to_python,
 )
+from compressor.cases.swept import FORMS
 from compressor.cases.table import GROUPS, TOP, WORDS, parts_by_key, table
 from compressor.cases.yaml_reader import Path, Problem, is_number
 
@@ -334,5 +336,12 @@ def walk_leaves(values: Mapping[Any, Any], above: Path = ()) -> Iterator[tuple[P
 
 
 def is_by_part(key: str, value: Any) -> bool:
-    """Return whether a value is one for each part of a key, and no sweep of one for all."""
-    return isinstance(value, Mapping) and not value.keys().isdisjoint(parts_by_key().get(key, ()))
+    """Return whether a value is one for each part of a key, and no sweep of one for all.
+
+    A part's name may be misspelt, or a word of the trade.
+    """
+    parts = parts_by_key().get(key, ())
+    if not parts or not isinstance(value, Mapping):
+        return False
+    is_form = bool(FORMS.keys() & value)
+    return any(n in parts or (not is_form and hint_at_part(key, parts, str(n))) for n in value)

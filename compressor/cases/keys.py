@@ -4,8 +4,9 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from compressor.cases.checks import DOUBLES, SWEEP, is_by_part, key_of, stands_for, walk_leaves
+from compressor.cases.checks import DOUBLES, SWEEP, key_of, stands_for, walk_leaves
 from compressor.cases.conflicts import IN_PLACE_OF
+from compressor.cases.swept import FORMS
 from compressor.cases.table import parts_by_key
 from compressor.cases.yaml_reader import Path, Place, Problem, Tree, read_text, shorten
 
@@ -30,7 +31,7 @@ def put(values: Mapping[str, Any], path: Path, value: Any, above: str = "") -> d
         return {**values, first: value}
     whole, inner = f"{above}.{first}".strip("."), values.get(first)
     parts = parts_by_key().get(whole, ())
-    if not isinstance(inner, dict) or (parts and not is_by_part(whole, inner)):
+    if not isinstance(inner, dict) or (rest[0] in parts and FORMS.keys() & inner):
         inner = dict.fromkeys(parts, inner) if first in values else {}
     return {**values, first: put(inner, tuple(rest), value, whole)}
 

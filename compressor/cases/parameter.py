@@ -479,11 +479,18 @@ def _problem_of_parts(key: str, value: Any, parts: Mapping[str, Parameter], caus
         return Problem(key, next(iter(parts.values())).explain(value, cause))
     for name in (str(one) for one in value if one not in parts):
         known = f"{key} has {', '.join(parts)}"
-        hint = did_you_mean(name, parts, {part: f"{key}.{part}" for part in parts})
-        return Problem(f"{key}.{name}", f"unknown key; {hint or known}")
+        told = (hint_at_part(key, parts, name) or known) + "; halve a diameter" * ("diam" in name)
+        return Problem(f"{key}.{name}", f"unknown key; {told}")
     needed = f"needs both, {' and '.join(parts)}, not {', '.join(value) or 'none'}"
     one = "pair" if next(iter(parts.values())).kind == "materials" else "number"
     return Problem(key, f"{needed}; or one {one} for both")
+
+
+def hint_at_part(key: str, parts: Iterable[str], name: str) -> str:
+    """Return what part of a key an unknown name means, as `did_you_mean`; "" without a guess."""
+    meant = {part: part for part in parts}
+    meant |= {pin: joint for pin, joint in PINS.items() if joint in meant}
+    return did_you_mean(name, meant, {word: f"{key}.{part}" for word, part in meant.items()})
 
 
 def _value_under(value: Any, name: str) -> Any:

@@ -289,11 +289,16 @@ def _sweep(path: tuple[Any, ...], key: str, value: Any) -> Sweep:
         raise NoSweep("cannot be swept: it does not change what a job computes; give one value")
     if isinstance(value, dict) and FORMS.keys() & value and not (row and row.is_number):
         raise NoSweep(f"is no number, so that {next(iter(value))} cannot sweep it: give a list")
+    names = [part.rpartition(".")[2] for part in parts]
     if parts and isinstance(value, list) and any(isinstance(one, dict) for one in value):
-        first, *_, last = (part.rpartition(".")[2] for part in parts)
-        form = f"{{{first}: [...], {last}: ...}}"
+        form = f"{{{names[0]}: [...], {names[-1]}: ...}}"
         raise NoSweep(f"a list has values of all parts alike: sweep each part, {form}")
-    return sweep_of(path, value, row is not None and row.kind == "integer")
+    try:
+        return sweep_of(path, value, row is not None and row.kind == "integer")
+    except NoSweep as error:
+        if parts and isinstance(value, dict) and not FORMS.keys() & value:
+            raise NoSweep(f"{error}; its parts are {' and '.join(names)}") from None
+        raise
 
 
 @make_group
