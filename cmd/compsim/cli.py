@@ -25,6 +25,7 @@ from compsim import screen
 MISTAKES = (FileNotFoundError, FileExistsError, NotADirectoryError, IsADirectoryError)
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")  # that ask a program to end; Windows has no SIGHUP
 NO_ROOM = ("failed to map segment", "Cannot allocate memory")  # as a library that is loaded says
+NO_THREAD = "can't start new thread"  # as Python says
 LIBRARIES = ("numpy", "scipy", "numba", "h5py", "xarray")
 UNREAD = 141  # exit code, as of a program that SIGPIPE ends, which Windows does not have
 COMPLETING = "_COMPSIM_COMPLETE"  # set by a shell that completes a word: click prints and exits
@@ -163,6 +164,9 @@ def report_error(error: Exception) -> int:
         return error.exit_code
     if isinstance(error, MemoryError) or any(words in str(error) for words in NO_ROOM):
         screen.say("compsim: not enough memory: allow more (ulimit -v), or use fewer workers (-j)")
+        return screen.INTERNAL
+    if NO_THREAD in f"{error} {error.__context__}":  # on which joblib may stumble
+        screen.say("compsim: too few processes: allow more (ulimit -u), or use fewer workers (-j)")
         return screen.INTERNAL
     if isinstance(error, OSError) and error.filename and not isinstance(error, MISTAKES):
         from compressor.store import system_error

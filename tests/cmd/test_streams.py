@@ -61,6 +61,14 @@ def test_a_lack_of_memory_is_told_in_one_line(capsys):
         assert said.startswith("compsim: not enough memory: allow more (ulimit -v)")
 
 
+def test_a_lack_of_processes_is_told_in_one_line(capsys):
+    error = AttributeError("'DummyProcess' object has no attribute 'terminate'")  # joblib's
+    error.__context__ = RuntimeError("can't start new thread")
+    for one in (error, error.__context__):
+        assert cli.report_error(one) == 1
+        assert capsys.readouterr().err.startswith("compsim: too few processes: allow more (ulimit")
+
+
 def test_a_path_that_cannot_be_read_is_named_in_one_line(capsys):
     for number in (errno.EACCES, errno.EIO, errno.ESTALE):
         assert cli.report_error(OSError(number, os.strerror(number), "/store/jobs")) == 5
