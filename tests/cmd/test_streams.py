@@ -81,9 +81,8 @@ def test_a_path_that_cannot_be_read_is_named_in_one_line(capsys):
 
 
 def test_a_current_folder_that_was_removed_is_told_in_one_line(tmp_path, monkeypatch, compsim):
-    (tmp_path / "gone").mkdir()
-    monkeypatch.chdir(tmp_path / "gone")
-    (tmp_path / "gone").rmdir()
+    monkeypatch.chdir(tmp_path)
+    tmp_path.rmdir()
     said = compsim("init", "machine", code=2).err
     assert said == "compsim: the current folder was removed; cd to one that is there\n"
 
