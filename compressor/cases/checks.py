@@ -269,6 +269,12 @@ def probable_keys(name: str, group: str) -> list[str]:
     every = [*keys_of(lambda key: key), *DOUBLES]
     if exact := [key for key in every if _leaf(key) == name]:
         return exact
+    outer, _, inner = name.rpartition(".")
+    if outer in GROUPS or outer in parts_by_key():
+        return probable_keys(inner, outer)
+    if outer:  # perhaps of a part, and without its group
+        paths = {path: key for key in table() for path in (key, key.partition(".")[2])}
+        return [paths[near] for near in get_close_matches(name, paths, 1, 0.8)]
     if "rotating_mass" in name:
         return []  # which no key has
     near = _nearest(name, known_keys(group), 0.6)
