@@ -53,20 +53,15 @@ def test_output_that_does_not_fit_is_told_in_one_line(spawn):
     assert line.startswith("compsim: stdout: No space left on device; ")
 
 
-def test_a_lack_of_memory_is_told_in_one_line(capsys):
+def test_a_lack_of_memory_or_processes_is_told_in_one_line(capsys):
     unmapped = ImportError("numpy.so: failed to map segment from shared object")
-    for error in (MemoryError("8 GiB"), unmapped, OSError(12, "Cannot allocate memory")):
+    of_joblib = AttributeError("'DummyProcess' object has no attribute 'terminate'")
+    of_joblib.__context__ = RuntimeError("can't start new thread")
+    memory = MemoryError("8 GiB"), unmapped, OSError(12, "Cannot allocate memory")
+    for error, option in (dict.fromkeys(memory, "-v") | {of_joblib: "-u"}).items():
         assert cli.report_error(error) == 1
-        said = capsys.readouterr().err
-        assert said.startswith("compsim: not enough memory: allow more (ulimit -v)")
-
-
-def test_a_lack_of_processes_is_told_in_one_line(capsys):
-    error = AttributeError("'DummyProcess' object has no attribute 'terminate'")  # joblib's
-    error.__context__ = RuntimeError("can't start new thread")
-    for one in (error, error.__context__):
-        assert cli.report_error(one) == 1
-        assert capsys.readouterr().err.startswith("compsim: too few processes: allow more (ulimit")
+        (said,) = capsys.readouterr().err.splitlines()
+        assert said.endswith(f": allow more (ulimit {option}), or use fewer workers (-j)")
 
 
 def test_a_path_that_cannot_be_read_is_named_in_one_line(capsys):
