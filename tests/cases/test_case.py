@@ -1,7 +1,5 @@
 """The case: what makes it the same job, what it fills in, and what it refuses."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +7,7 @@ from hypothesis import strategies as st
 
 from compressor.cases.case import Case
 from compressor.cases.checks import known_keys
-from compressor.cases.parameter import CaseError, PerJoint, to_si
+from compressor.cases.parameter import CaseError, to_si
 from compressor.cases.table import table
 from compressor.program import CompsimError
 from compressor.solve.simulate import simulate
@@ -178,26 +176,6 @@ def told(values) -> list[str]:
 )  # fmt: skip
 def test_values_that_no_file_holds(values, message):
     assert told(WORN | values) == [message]
-
-
-NEEDED = "clearance_mm.{0}: is needed with joint: {1}; give it in mm, such as 0.2"
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"joint": "both"}, NEEDED.format("small_end", "both")),
-        ({"joint": "small_end"}, NEEDED.format("small_end", "small_end")),
-        ({"machine": {"speed": 7}}, "machine.speed: unknown key; did you mean machine.speed_rpm?"),
-    ],
-)
-def test_a_case_made_of_another_is_checked(change, message):
-    case = Case.from_values({"load": "gas"} | WORN)
-    with pytest.raises(CaseError) as caught:
-        replace(replace(case, load="none"), **change)
-    assert str(caught.value) == message
-    given = replace(Case.from_values({"joint": "both", "clearance_mm": 0}), load="none")
-    assert given.clearance_mm == PerJoint(0.0, 0.0)
 
 
 @pytest.mark.parametrize("values", [5, "big-end.yaml", [WORN], None])

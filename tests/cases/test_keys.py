@@ -29,12 +29,21 @@ def test_a_file_gives_one_radius_or_one_for_each_joint():
 
 
 def test_a_case_is_replaced_in_the_words_of_a_case():
-    for values in ({"joint": "top"}, {"clearance_mm": {"top": 1}}):
+    for values in ({"joint": "top"}, {"clearance_mm": {"top": 1}}, {"machine": {"speed": 7}}):
         with pytest.raises(CaseError) as replaced:
             replace(case(), **values)
         with pytest.raises(CaseError) as made:
             case(**values)
         assert str(replaced.value) == str(made.value)
+
+
+def test_another_joint_needs_its_clearance_in_python_too():
+    alone = replace(Case.from_values({"joint": "big_end", "clearance_mm": 0.2}), load="none")
+    for joint in ("small_end", "both"):
+        with pytest.raises(CaseError, match=f"^clearance_mm.small_end: is needed .*: {joint};"):
+            replace(alone, joint=joint)
+    both = Case.from_values({"joint": "both", "clearance_mm": 0})  # which is given
+    assert replace(both, load="none").clearance_mm == both.clearance_mm
 
 
 def test_a_pin_of_a_file_s_own_lies_in_its_bore():
