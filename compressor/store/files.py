@@ -31,6 +31,7 @@ REMEDIES = {
     errno.EPERM: FORBIDDEN,
     errno.EROFS: FORBIDDEN,
     errno.ENOTDIR: ELSEWHERE,
+    errno.ENAMETOOLONG: ELSEWHERE,
     errno.EMFILE: "allow more open files (ulimit -n)",
 }
 

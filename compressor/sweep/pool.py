@@ -31,7 +31,15 @@ from joblib import Parallel, cpu_count, delayed
 from compressor.program import THREAD_VARIABLES, CompsimError
 from compressor.reasons import Reason
 from compressor.store import StoreError
-from compressor.sweep.worker import ENDING, End, Store, Workers, WorkersFailed, open_socket
+from compressor.sweep.worker import (
+    ENDING,
+    NO_WORKER,
+    End,
+    Store,
+    Workers,
+    WorkersFailed,
+    open_socket,
+)
 
 Input = tuple[Hashable, Any, float]  # id, payload, wall time that the job may take (s)
 
@@ -194,7 +202,7 @@ class Pool:
                     self.loader = Loader(self.setup)
             return self.loader.start_worker()
         except OSError as error:
-            raise WorkersFailed(f"no worker process can be started: {error}") from error
+            raise WorkersFailed(NO_WORKER.format(error)) from error
 
     def settle(self, job: Job, end: End) -> End:
         """Return the end of a job with its id."""

@@ -19,6 +19,10 @@ from compressor.store import StoreError
 
 MAX_OVERRUN = 2.0  # target_seconds after which a worker gives the rest of a batch back
 MAX_TEXT = 20_000  # characters of a traceback
+NO_WORKER = (
+    "no worker process can be started: {}; allow more processes and files (ulimit -u, -n), or use "
+    "fewer workers (-j)"
+)
 ENDING = [signal.SIGINT, signal.SIGTERM]
 if hasattr(signal, "SIGHUP"):  # not on Windows
     ENDING.append(signal.SIGHUP)
@@ -103,7 +107,7 @@ def answer_calls(calls: Connection) -> Connection | None:
             try:
                 pid = os.fork()
             except OSError as error:
-                calls.send(WorkersFailed(f"no worker process can be started: {error}"))
+                calls.send(WorkersFailed(NO_WORKER.format(error)))
                 continue
             if not pid:
                 calls.close()

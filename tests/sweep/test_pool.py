@@ -186,7 +186,9 @@ def test_no_room_for_workers_ends_the_call(what, monkeypatch):
         raise BlockingIOError("no more processes")
 
     monkeypatch.setattr(*what, refuse)
-    with pytest.raises(WorkersFailed, match="no worker process can be started: no more processes"):
+    with pytest.raises(
+        WorkersFailed, match="no worker process can be started: no more processes; allow"
+    ):
         list(run_batches(work, named(range(100)), Workers()))
 
 
