@@ -210,7 +210,8 @@ stroke, 240 mm
         if isinstance(values, ArgsKwargs):
             found = {"joint": "none", "clearance_mm": None} | (values.kwargs or {})
             play, given = found["clearance_mm"], find_given({"clearance_mm": found["clearance_mm"]})
-            for one in ("none", *JOINTS) if isinstance(play, PerJoint) else ():
+            gaps = vars(play).values() if isinstance(play, PerJoint) else ()
+            for one in ("none", *JOINTS) if {*map(type, gaps)} == {float} else ():
                 if play is play_of(one, play.at(one)):  # which fills in 0
                     given = frozenset({f"clearance_mm.{one}"})
             if problems := given_conflicts(str(found["joint"]), given):

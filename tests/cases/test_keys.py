@@ -8,6 +8,7 @@ import pytest
 from compressor.cases.case import Case, CaseError
 from compressor.cases.checks import DOUBLES
 from compressor.cases.materials import composite_modulus, contact_stiffness
+from compressor.cases.parameter import PerJoint
 from compressor.solve.si_record import record
 
 WORN = {"joint": "both", "clearance_mm": 0.2}
@@ -29,7 +30,8 @@ def test_a_file_gives_one_radius_or_one_for_each_joint():
 
 
 def test_a_case_is_replaced_in_the_words_of_a_case():
-    for values in ({"joint": "top"}, {"clearance_mm": {"top": 1}}, {"machine": {"speed": 7}}):
+    wrong = {"joint": "top"}, {"machine": {"speed": 7}}
+    for values in (*wrong, {"clearance_mm": {"top": 1}}, {"clearance_mm": PerJoint([1], 2)}):
         with pytest.raises(CaseError) as replaced:
             replace(case(), **values)
         with pytest.raises(CaseError) as made:
