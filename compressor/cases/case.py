@@ -124,8 +124,8 @@ class Case:
     compressor.cases.parameter.CaseError: spring.stroke_mm: 300 mm must be less than the piston's \
 stroke, 240 mm
 
-    What was filled in stays, such as a uniform rod's inertia beside another mass; None fills it in
-    anew.
+    What was filled in stays: a uniform rod's inertia beside another mass, where None fills it in
+    anew, and the clearance 0 of a joint without play, so give another `joint` its `clearance_mm`.
     """
 
     name: str = TOP["name"]
@@ -209,11 +209,7 @@ stroke, 240 mm
         """Return the values; those of Python give the clearance of each joint with play."""
         if isinstance(values, ArgsKwargs):
             found = {"joint": "none", "clearance_mm": None} | (values.kwargs or {})
-            play, given = found["clearance_mm"], find_given({"clearance_mm": found["clearance_mm"]})
-            gaps = vars(play).values() if isinstance(play, PerJoint) else ()
-            for one in ("none", *JOINTS) if {*map(type, gaps)} == {float} else ():
-                if play is play_of(one, play.at(one)):  # which fills in 0
-                    given = frozenset({f"clearance_mm.{one}"})
+            given = find_given({"clearance_mm": found["clearance_mm"]})
             if problems := given_conflicts(str(found["joint"]), given):
                 raise CaseError(problems)
         return values
@@ -227,8 +223,8 @@ stroke, 240 mm
         if self.guide:
             values["guide"] = fill_guide(self.guide, self.machine.reciprocating_mass_kg)
         if self.joint != "both":
-            gap = 0.0 if self.joint == "none" else self.clearance_mm.at(self.joint)
-            values["clearance_mm"] = play_of(self.joint, gap)
+            gaps = {one: self.clearance_mm.at(one) if one == self.joint else 0.0 for one in JOINTS}
+            values["clearance_mm"] = PerJoint(**gaps)
         if self.joint == "none":  # which has no bore that oil fills, or that wears
             values["lubricant"] = values["wear"] = None
         if self.wear:
@@ -417,15 +413,6 @@ stroke, 240 mm
         """Return what is stored of a case: `name`, `case` (JSON), `key` and `physics_key`."""
         text = json.dumps(self.values(), sort_keys=True)
         return {"name": self.name, "case": text, "key": self.key, "physics_key": self.physics_key}
-
-
-@lru_cache(MAX_GROUPS)
-def play_of(joint: str, clearance: float) -> PerJoint[float]:
-    """Return the clearances of a case whose `joint` is this one or none; equal ones are one object.
-
-    By that `dataclasses.replace` tells the 0 of the other joint from one that is given.
-    """
-    return PerJoint(**{one: clearance if one == joint else 0.0 for one in JOINTS})
 
 
 def require_case(value: Any) -> Case:

@@ -39,13 +39,10 @@ def test_a_case_is_replaced_in_the_words_of_a_case():
         assert str(replaced.value) == str(made.value)
 
 
-def test_another_joint_needs_its_clearance_in_python_too():
-    alone = replace(Case.from_values({"joint": "big_end", "clearance_mm": 0.2}), load="none")
-    for joint in ("small_end", "both"):
-        with pytest.raises(CaseError, match=f"^clearance_mm.small_end: is needed .*: {joint};"):
-            replace(alone, joint=joint)
-    both = Case.from_values({"joint": "both", "clearance_mm": 0})  # which is given
-    assert replace(both, load="none").clearance_mm == both.clearance_mm
+def test_a_joint_needs_its_clearance_in_python_too():
+    for values in ({}, {"clearance_mm": {"big_end": 0.2}}):
+        with pytest.raises(CaseError, match=r"clearance_mm.small_end: is needed .*: both;"):
+            Case(joint="both", **values)
 
 
 def test_a_pin_of_a_file_s_own_lies_in_its_bore():
