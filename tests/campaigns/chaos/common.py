@@ -21,6 +21,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from click.testing import CliRunner
 from compsim import cli
 
@@ -82,8 +83,8 @@ def contents(folder, foreign=()):
     foreign: attributes that do not count.
     """
     stored, found = read_store(folder), {}
-    for position, key in enumerate(stored.columns["job"]):
-        one = stored.outcome(position)
+    for position in np.argsort(stored.places[1]):  # a batch at a time, which stays in memory
+        key, one = stored.columns["job"][position], stored.outcome(position)
         parts = [one.status, one.reason]
         parts += [one.numbers[name].tobytes() for name in one.numbers.dtype.names if name != TIMED]
         parts += [(name, one.attributes[name]) for name in one.attributes if name not in foreign]
