@@ -375,5 +375,4 @@ def draw_wear(machines: Iterable[WornMachine], title: str = "") -> report.Plotly
         panel.title = f"({letter})"
         panel.rule(report.style.LineStyle(report.style.GREY, linewidth=0.5, zorder=0), y=0.0)
     some = f"the first {len(drawn)} of {len(alive)} machines" * (len(drawn) < len(alive))
-    drawing.drawn.layout.title = ": ".join(filter(None, (title, some)))
-    return drawing.figure()
+    return drawing.figure(": ".join(filter(None, (title, some))))

@@ -1,7 +1,7 @@
 """Figures as plotly's own `Figure`: a grid of panels to fill, and what is read of one again.
 
 A figure function fills the panels of `make_grid`, each axis in the unit that is wanted, and returns
-`drawing.figure()`. `picture` makes the PNG of that, `as_csv` its table, and `report/interactive`
+`drawing.figure()`. `pictures` makes the PNG of that, `as_csv` its table, and `report/interactive`
 the script of the page. Ranges and ticks are plotly's and matplotlib's own, unless a figure says.
 """
 
@@ -255,17 +255,19 @@ SHARED = ("range", "type", "dtick", "tickvals", "ticktext", "nticks", "showgrid"
 
 
 class Drawing:
-    """A grid of panels that becomes a figure; `drawn`: so far."""
+    """A grid of panels that becomes a figure."""
 
     def __init__(self, panels: list[Panel]) -> None:
         self.panels, self.drawn = panels, panels[0].figure
 
-    def figure(self) -> go.Figure:
-        """Return the figure.
+    def figure(self, title: str = "") -> go.Figure:
+        """Return the figure, with a title if there is one.
 
         Axes that share a scale have the ticks of the first of them, and numbers and a title on the
         outside: of x in the lowest panel of a column, of y in the first of a row.
         """
+        if title:
+            self.drawn.layout.title = title
         is_unified = all(is_rising(one) for one in self.drawn.data if one.name)
         for panel, way in itertools.product(self.panels, WAYS):
             axis = panel.axis(way)

@@ -387,5 +387,5 @@ def draw_alarms(found: xr.Dataset, title: str = "") -> report.PlotlyFigure:
         panel.title = f"({'abc'[joints.index(joint)]}) {joint.replace('_', ' ')}"
         panel.x.title = "clearance (mm)"
         panel.span("y", -0.02, 1.04)
-    grid.flat[0].y.title, drawing.drawn.layout.title = "windows in which it trips", title
-    return drawing.figure()
+    grid.flat[0].y.title = "windows in which it trips"
+    return drawing.figure(title)

@@ -96,8 +96,7 @@ def draw_followed(machine: xr.Dataset, title: str = "") -> report.PlotlyFigure:
         leave_room(panel)
     low, *_, high = report.midway(np.sort(x), log)
     panels[0].span("x", low, high)
-    drawing.drawn.layout.title = title
-    return drawing.figure()
+    return drawing.figure(title)
 
 
 def plot(
