@@ -82,7 +82,7 @@ def main(target):
     kept = {**provenance("make tradeoff"), "points": [*points(found)], "changes": moved}
     keep(target, kept, 3)
     drawn = draw_work_precision(tabulate(kept["points"]))
-    Path(target).with_suffix(".svg").write_bytes(render(drawn, "svg"))
+    Path(target).with_suffix(".png").write_bytes(render(drawn))
 
 
 if __name__ == "__main__":

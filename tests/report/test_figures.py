@@ -210,9 +210,9 @@ def test_a_users_settings_neither_matter_nor_change(paper_runs):
     with matplotlib.rc_context({"axes.facecolor": "red", "font.size": 30.0, "axes.grid": False}):
         before = dict(matplotlib.rcParams)
         figure = FIGURE[7].make(paper_runs).figure
-        mine = pictures.render(figure, "svg")
+        mine = pictures.render(figure)
         assert dict(matplotlib.rcParams) == before
-    assert mine == pictures.render(FIGURE[7].make(paper_runs).figure, "svg")
+    assert mine == pictures.render(FIGURE[7].make(paper_runs).figure)
 
 
 # ---- captions: numbers that are those of the drawn runs

@@ -74,18 +74,15 @@ STYLE: Any = {
     "legend.handlelength": 3.2,
     "lines.dash_capstyle": "butt",
     "agg.path.chunksize": 20000,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "compsim",
 }
 
 
 @rc_context(STYLE)  # matplotlib.style would first parse its library
-def render(figure: go.Figure, kind: str = "png") -> bytes:
-    """Return a figure as the bytes of a `png` or `svg` file, without a time stamp."""
+def render(figure: go.Figure) -> bytes:
+    """Return a figure as the bytes of a PNG file, without a time stamp."""
     stream, painted = io.BytesIO(), paint(figure)
     box = whole_box(painted, figure).padded(EDGE)
-    metadata = {"Date": None} if kind == "svg" else {}
-    painted.savefig(stream, format=kind, bbox_inches=box, metadata=metadata)
+    painted.savefig(stream, format="png", bbox_inches=box)
     return stream.getvalue()
 
 
@@ -297,8 +294,7 @@ def paint_map(axes: Axes, trace: go.Heatmap) -> None:
     colors = LinearSegmentedColormap.from_list("", stops)
     x, y = (midway(np.asarray(at), scale == "log") for at, scale
             in ((trace.x, axes.get_xscale()), (trace.y, axes.get_yscale())))  # fmt: skip
-    axes.pcolormesh(x, y, np.ma.masked_invalid(trace.z), norm=norm, cmap=colors,
-                    rasterized=True, zorder=1.5)  # fmt: skip
+    axes.pcolormesh(x, y, np.ma.masked_invalid(trace.z), norm=norm, cmap=colors, zorder=1.5)
     if trace.showscale is not False:
         scale = trace.colorbar
         box = axes.get_position()
