@@ -231,6 +231,7 @@ def test_a_picture_shows_what_the_figure_has():
     drawing, (curve, area, bars, cells) = (made := make_grid(1, 4, 3.0))[0], made[1].flat
     colors = {"curve": "#ff0000", "area": "#00ff00", "bars": "#0000ff", "map": "#ff00ff"}
     curve.plot([0, 1], [0, 1], LineStyle(colors["curve"], linewidth=4))
+    curve.plot([0.5], [0.5], mark("#000000", "circle", 4.0), errors=np.full((2, 1), 0.4))
     area.fill([0, 1, 1], [0, 0, 1], fill(colors["area"]))
     bars.bars([1.0, 2.0], [0.0, 1.0], fill(colors["bars"]))
     cells.map(np.zeros(1), np.zeros(1), np.array([[0.0]]), [colors["map"], "#ffffff"], (0.0, 1.0))
@@ -238,3 +239,4 @@ def test_a_picture_shows_what_the_figure_has():
     for name, color in colors.items():
         share = np.isclose(seen, to_rgb(color)).all(axis=2).mean()
         assert share > 0.001, name
+    assert not np.isclose(seen, to_rgb("C0")).all(axis=2).any(), "error bars in matplotlib's colour"

@@ -241,7 +241,7 @@ def line_look(line: Any) -> dict[str, Any]:
 def curve_look(trace: go.Scatter) -> dict[str, Any]:
     """Return the keywords of a curve of matplotlib: its line, its marks or both."""
     marks, symbol = trace.marker, trace.marker.symbol or ""
-    look = line_look(trace.line) if "lines" in trace.mode else {"linestyle": "none"}
+    look = line_look(trace.line) | ({} if "lines" in trace.mode else {"linestyle": "none"})
     look["alpha"] = trace.opacity
     if "markers" in trace.mode:
         is_open = symbol.endswith("-open")
