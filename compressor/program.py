@@ -138,7 +138,7 @@ class CompsimError(Exception):
     prefix = "compsim: "
 
 
-class NoFolder(CompsimError):
+class NoCodeFolder(CompsimError):
     """Machine code can be kept nowhere."""
 
     exit_code = 2
@@ -209,8 +209,8 @@ def machine_code_folder() -> Path:
     """Return the folder of machine code, named by a hash of the sources.
 
     It is in NUMBA_CACHE_DIR if that is set, else beside the sources, else in the user's cache.
-    Raises NoFolder where nothing can be written. Numba itself would go on using a caller's old code
-    after a change of what it calls in another file.
+    Raises NoCodeFolder where nothing can be written. Numba itself would go on using a caller's old
+    code after a change of what it calls in another file.
     """
     named = os.environ.get(CODE_VARIABLE)
     cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # as it is, homeless
@@ -220,7 +220,7 @@ def machine_code_folder() -> Path:
             return place / f"numba-{sources_hash(COMPILED)}"
     where = named or f"beside {COMPILED} or in the user's cache"
     text = f"nothing can be written to {where}, where machine code would be kept"
-    raise NoFolder(f"{text}: set {CODE_VARIABLE} to a folder that stays")
+    raise NoCodeFolder(f"{text}: set {CODE_VARIABLE} to a folder that stays")
 
 
 @functools.cache

@@ -73,5 +73,6 @@ def test_a_named_folder_that_takes_no_file_is_refused(kind, tmp_path, monkeypatc
     if kind == "file":
         named.write_text("")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(named))
-    with pytest.raises(program.NoFolder, match=f"to {named}, .*: set NUMBA_CACHE_DIR to a folder"):
+    told = f"to {named}, .*: set NUMBA_CACHE_DIR to a folder"
+    with pytest.raises(program.NoCodeFolder, match=told):
         program.machine_code_folder()
