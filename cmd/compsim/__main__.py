@@ -12,7 +12,9 @@ def main() -> int:
     gc.set_threshold(50_000)  # what is loaded is no garbage: to look at it took a tenth of a start
     from compsim import cli
 
-    return cli.main()
+    code = cli.main()
+    gc.freeze()  # nor is what ends with the program: to look at it took a quarter of a second
+    return code
 
 
 if __name__ == "__main__":
