@@ -16,7 +16,7 @@ WORST = 10  # jobs that are listed
 @options.as_json
 @options.quiet
 def judge(study, folder, jobs, as_json, quiet) -> int:
-    """Compare a study's numbers with other integrators', by error bars.
+    """Judge a study's numbers by other integrators.
 
     \b
     compsim init extremes

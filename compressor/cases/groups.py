@@ -103,8 +103,8 @@ class Machine:
     balance: PerMotion[float] | None = by_part(
         PerMotion,
         number(
-            None, "[0, 1]", "share that a counterweight balances; in place of counterweight_kg_mm",
-            "none",
+            None, "[0, 1]",
+            "fraction that a counterweight balances; in place of counterweight_kg_mm", "none",
         ),
     )  # fmt: skip
 
@@ -444,12 +444,12 @@ class Solve:
     )  # fmt: skip
     rtol: float | None = number(None, "[1e-13, 0.1]", "relative tolerance, in place of accuracy")
     error_bars: bool = flag(
-        True, "errors of metrics, from a second run; not part of a job's identity", identity=False
+        True, "errors of metrics, from a second run; not part of a job's key", identity=False
     )
     horizon: bool | str = flag(
         "auto",
         "time for which the motion can be predicted: auto measures it where errors are large, true "
-        "always; not part of a job's identity",
+        "always; not part of a job's key",
         choices=("auto",), identity=False,
     )  # fmt: skip
     method: str = choice(
@@ -457,7 +457,7 @@ class Solve:
     )
     max_steps: int = integer(5_000_000, "[1, 1e12]", "budget of integration steps")
     timeout_s: float = number(
-        600.0, "(0, 1e7]", "budget of wall time; not part of a job's identity", identity=False
+        600.0, "(0, 1e7]", "budget of wall time; not part of a job's key", identity=False
     )
 
     def __post_init__(self) -> None:
@@ -475,7 +475,7 @@ class Solve:
 
 @make_group
 class Output:
-    """What is stored of a job; a case's `output`. Not part of the job's identity."""
+    """What is stored of a job; a case's `output`. Not part of the job's key."""
 
     keep: str = choice(
         "series", ("series", "metrics"), "stored results: time series too, or metrics only",

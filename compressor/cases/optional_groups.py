@@ -24,7 +24,7 @@ MIN_RATIO, MAX_RATIO = 0.125, 1.0  # of a bearing's length and diameter
 class Lubricant:
     """An oil film in the joints that have clearance; a case's `lubricant`, None: they run dry.
 
-    The film bears by rotation and squeeze; in its last share of the clearance the dry contact takes
+    The film bears by rotation and squeeze; in the last part of the clearance the dry contact takes
     over. `True` stands for the defaults.
     """
 
@@ -38,7 +38,7 @@ class Lubricant:
         AT_JOINTS,
     )  # fmt: skip
     last_share: float = number(
-        0.02, "[0.001, 0.5]", "share of the clearance below which the film gets no thinner",
+        0.02, "[0.001, 0.5]", "fraction of the clearance below which the film gets no thinner",
         judged=(0.01, 0.1),
     )  # fmt: skip
 
@@ -255,7 +255,8 @@ class Sensor:
         read="sensor.noise_m_per_s2 > 0 or sensor.speed_jitter > 0",
     )  # fmt: skip
     length_rev: int | None = integer(
-        None, "[1, 10000]", "revolutions of the record; more of them repeat", "the settled ones",
+        None, "[1, 10000]", "revolutions of the record; beyond the settled ones they repeat",
+        "program: the settled ones",
         read="body.start == steady",
     )  # fmt: skip
     threshold_m_per_s2: float | None = number(
