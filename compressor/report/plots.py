@@ -327,8 +327,9 @@ def select_jobs(
     jobs.sort(key=lambda job: n if isinstance(n := job[0].get(over), int | float) else -math.inf)
     values = ", ".join(f"{name} {shown_value(value)}" for name, value in fixed.items())
     where = [values] * bool(values)
-    order = f"in the order of {over}, " * any(numbers)
-    where += [f"{order}{', '.join(varied)} vary along with it"] * bool(varied)
+    order = f"in the order of {over}; " * any(numbers)
+    vary = "vary" if varied[1:] else "varies"
+    where += [f"{order}{', '.join(varied)} {vary} with it"] * bool(varied)
     if len(jobs) > most:
         where.append(f"{most} of {len(jobs)} jobs, evenly chosen")
     names = [" / ".join(shown_value(point.get(name, "")) for name in (over, *beside))

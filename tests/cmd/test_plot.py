@@ -151,8 +151,8 @@ def test_rows_name_both_clearances_and_words():
     jobs, title, where = select_jobs("", study, axes[0].key, (), 5)
     assert jobs == [(" /  / ", "i"), ("0.1 / 0.35 / hertz", "b"), ("0.3 / 0.05 / impact", "a")]
     assert title == "clearance, big end (mm) / clearance, small end (mm) / law"
-    varied = f"{axes[1].key}, {axes[2].key} vary along with it"
-    assert where == [f"in the order of {axes[0].key}, {varied}"]
+    varied = f"{axes[1].key}, {axes[2].key} vary with it"
+    assert where == [f"in the order of {axes[0].key}; {varied}"]
 
 
 def test_a_damaged_job_is_a_row_without_series(folder, tmp_path, compsim, unpainted):

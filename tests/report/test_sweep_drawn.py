@@ -48,6 +48,15 @@ def test_a_point_a_job_with_its_bar_and_key():
     assert rms.traces[0].error_y.array is None  # its bars of 0.01 % are not seen
 
 
+def test_keys_that_change_together_are_a_curve():
+    worn = {"big": [0.3, 0.1, 0.2], "small": [0.03, 0.01, 0.02]}
+    (drawn,) = draw_sweep(listed(worn, [300, 100, 200]))
+    (curve,) = panels_of(drawn.figure)[0].traces
+    assert (*curve.x, *curve.customdata) == (0.1, 0.2, 0.3, "k1", "k2", "k0")
+    assert drawn.sentence.startswith("Every metric against big (small with it), a point a job")
+    assert "points" in plan(listed(worn | {"small": [0.03, 0.01, 0.04]}, [300, 100, 200]))
+
+
 def test_noise_is_no_trend():
     """An axis from 39.232 to 39.238 mm/s, in the bars' own middle, was a falling line."""
     (drawn,) = draw_sweep(grid({"clearance_mm": CLEARANCES}, lambda c: 39.23 + 0.01 * c))

@@ -176,7 +176,7 @@ SIGNALS = (
     Signal("force on the frame across the cylinder", "Y", "kN", "across"),
     Signal("force of the crosshead on its guide, upwards", "F<sub>g</sub>", "kN", "guide_force"),
     Signal("torque that drives the crank", "T", "N m", "crank_torque"),
-    Signal("load of gas or spring on the piston, tension positive", "F<sub>p</sub>", "kN", "load"),
+    Signal("load of gas or spring on the piston, tension positive", "−F<sub>p</sub>", "kN", "load"),
     Signal("inertia of what reciprocates", "F<sub>i</sub>", "kN", "inertia"),
     Signal("rod load at the crosshead pin: both combined", "F<sub>r</sub>", "kN", "rod_load"),
 )

@@ -12,6 +12,7 @@ from compressor.report.figures.sweep_data import (
     Measure,
     PlottedAxis,
     PlottedSweep,
+    join_zipped,
     measures,
     shown_value,
     sweep_of,
@@ -52,6 +53,8 @@ def draw_sweep(
     sweep = sweep_of(data)
     if not known or not sweep.axes:
         return []
+    others = [axis.phrase for axis in sweep.axes[1:]]
+    sweep = join_zipped(sweep)
     shown, same = split_measures(sweep, known)
     if not shown:
         shown, same = known, []
@@ -60,14 +63,15 @@ def draw_sweep(
         return [*draw_sampled(sweep, shown, about)]
     if len(sweep.axes) == 1:
         (axis,) = sweep.axes
+        along = f" ({' and '.join(others)} with it)" * bool(others)
         sentence = (
-            f"Every metric against {axis.phrase}, a point a job, with error bars where one is long "
-            "enough to be seen."
+            f"Every metric against {axis.phrase}{along}, a point a job, with error bars where one "
+            "is long enough to be seen."
         )
         return [DrawnFigure(
             sweep_panels.draw_curves(sweep, shown, limits), sentence,
             [*count_drawn(axis, sweep_panels.MAX_JOBS), *about],
-            zone_words(shown, limits), axis.name, f"metrics against {axis.phrase}",
+            zone_words(shown, limits), axis.name, f"metrics against {axis.phrase}{along}",
         )]  # fmt: skip
     return [*draw_grid(sweep, shown, about, limits)]
 

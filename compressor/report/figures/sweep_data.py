@@ -241,6 +241,22 @@ def sweep_of(data: xr.Dataset) -> PlottedSweep:
     return PlottedSweep(data, tuple(axis_of(data, name) for name in names))
 
 
+def join_zipped(sweep: PlottedSweep) -> PlottedSweep:
+    """Return jobs whose keys all rise or fall together, as keys that are zipped, as a curve.
+
+    Over the first of them; others are returned as they are.
+    """
+    first = sweep.axes[0]
+    if sweep.is_grid or len(sweep.axes) < 2 or any(axis.is_words for axis in sweep.axes):
+        return sweep
+    order = np.argsort(first.places)
+    steps = [np.diff(axis.places[order]) for axis in sweep.axes]
+    if first.values.size < 3 or not all((one > 0).all() or (one < 0).all() for one in steps):
+        return sweep  # of two jobs everything does
+    data = sweep.data.isel(job=order).swap_dims(job=first.name)
+    return PlottedSweep(data, (replace(first, values=first.values[order]),))
+
+
 def coarse(sweep: PlottedSweep, axis: int, most: int) -> PlottedSweep:
     """Return a grid with at most so many values of an axis, evenly chosen, the ends among them."""
     one = sweep.axes[axis]
