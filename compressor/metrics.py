@@ -127,7 +127,7 @@ TABLE = (
         "knock", ("joint",), "1",
         "force of the hardest blow of a journal on its bore over the greatest joint force; above "
         f"{KNOCKS:g} the joint knocks", "contact_force", Bar(relative=False),
-        shown=Shown(f"knock (above {KNOCKS:g} it knocks)", ""), contact=True, kind="greatest",
+        shown=Shown(f"knock (limit {KNOCKS:g})", ""), contact=True, kind="greatest",
         limit=KNOCKS, made=lambda t: t.ratio(t.blow, t.greatest("FORCE_SIZE", 2)),
     ),
     Metric(

@@ -22,7 +22,8 @@ def export(names, folder, output, force) -> int:
 
     A STUDY becomes a table of its jobs, failed and missing ones included; several, and all
     without a name, become one table. A JOB, named by the beginning of its key, becomes a table of
-    samples, with its sensor's record beside. Numbers are in SI.
+    samples, with its sensor's record beside. They begin with the start-up, which metrics leave out.
+    Numbers are in SI.
     """
     from compressor.store import export as write
     from compressor.store import writable_folder

@@ -55,7 +55,8 @@ def find(config, over, folder, jobs, units, as_json, quiet, **asked) -> int:
     the first change is narrowed down; the scan misses two changes between two of its points.
     For a chaotic motion the mean of a peak over revolutions counts.
 
-    Each point is a stored job of the study CONFIG-find-KEY. --json has all numbers in SI. Exit
+    Each point is a stored job of the study CONFIG-find-KEY; another question over this key takes
+    the study's place, and the jobs stay stored. --json has all numbers in SI. Exit
     code 3 if the job of any point failed.
     """
     options.check_json_units(as_json, units)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.analysis.cylinder import card_noise, fit_polytrope
-from compressor.analysis.machine_numbers import sample_cases
+from compressor.analysis.machine_numbers import is_own, sample_cases
 from compressor.cases import (
     Body,
     Case,
@@ -198,10 +198,26 @@ def check_machine(case: Case) -> Remarks:
             f"that of yours is not: drawn rods have up to {HEAVY_ENDS:g} times as much, and at "
             f"most {apart:.3g}, with all mass in their bores; it moves the forces across the rod"
         )  # fmt: skip
+    if machine.rod_inertia_kg_m2 != bar and apart and (machine.rod_inertia_kg_m2 or 0.0) > apart:
+        yield key, (
+            f"{machine.rod_inertia_kg_m2:g} kg m2 is more than {apart:.3g}, with all mass in the "
+            "rod's bores; it is about the rod's mass centre"
+        )  # fmt: skip
     if radius > LONGEST_CRANK * length:
         yield "machine.crank_radius_mm", (
             f"{radius:g} mm is {radius / length:.2g} of the rod's length, more than the usual "
             f"{LONGEST_CRANK:g}: the crank radius is half the stroke"
+        )  # fmt: skip
+
+
+def check_cylinder(case: Case) -> Remarks:
+    """Yield the paper's bore beside a stroke or a rod of one's own."""
+    keys = "machine.crank_radius_mm", "machine.rod_length_mm", "gas.piston_radius_mm"
+    *has_own_lengths, has_own_bore = (is_own(case, [key]) for key in keys)
+    if case.load == "gas" and any(has_own_lengths) and not has_own_bore:
+        yield "gas.bore_mm", (
+            f"{2 * case.gas.piston_radius_mm:g} mm is the paper's, and stroke or rod are not: give "
+            "gas.bore_mm and the pressures of your cylinder"
         )  # fmt: skip
 
 
@@ -331,8 +347,8 @@ def check_friction(case: Case) -> Remarks:
 
 Check = Callable[[Case], Remarks]
 CHECKS: tuple[Check, ...] = (
-    check_machine, check_judged, check_paper_pin, check_body, check_depth, check_rod, check_cards,
-    check_friction,
+    check_machine, check_cylinder, check_judged, check_paper_pin, check_body, check_depth,
+    check_rod, check_cards, check_friction,
 )  # fmt: skip
 
 

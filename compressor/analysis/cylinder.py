@@ -4,9 +4,9 @@ Of perfect gas with the exponent n on both polytropics, at the pressures p1 and 
 valves are open (those of suction and discharge, lowered and raised by the valves' losses), with
 r = p2 / p1, and with a clearance of c times the swept volume V:
 
-    volumetric efficiency   e = 1 + c - c r^(1/n)
-    indicated work          n / (n - 1) p1 e V (r^((n-1)/n) - 1)      p1 e V ln r where n = 1
-    capacity                e V p1 / p_s, at the suction pressure p_s before the valve
+    filled part of V   e = 1 + c - c r^(1/n)
+    indicated work     n / (n - 1) p1 e V (r^((n-1)/n) - 1)      p1 e V ln r where n = 1
+    capacity           e V p1 / p_s, at the suction pressure p_s before the valve
 
 The second and third are a revolution's. A valve throttles perfect gas without a change of
 temperature, so that the capacity falls with the pressure behind it.
@@ -31,7 +31,6 @@ class IdealCycle(NamedTuple):
 
     swept_volume: float  # m3
     clearance_volume: float  # m3
-    volumetric_efficiency: float  # of the swept volume: what is filled at the pressure inside
     indicated_work: float  # that the gas takes in a revolution, J
     capacity: float  # at suction conditions, m3 a revolution
 
@@ -57,12 +56,12 @@ def _ideal_cycle(case: Case, end: str) -> IdealCycle:
     clearance = area * to_si(gas.clearance(end, stroke), "mm")
     inlet, outlet = (to_si(pressure, "MPa") for pressure in gas.open_pressures)
     ratio, n = outlet / inlet, gas.exponent
-    efficiency = 1.0 + clearance / swept * (1.0 - ratio ** (1.0 / n))
+    filled = 1.0 + clearance / swept * (1.0 - ratio ** (1.0 / n))
     part = (n - 1.0) / n
     rise = math.expm1(part * math.log(ratio)) / part if part else math.log(ratio)
     return IdealCycle(
-        swept, clearance, efficiency, inlet * efficiency * swept * rise,
-        efficiency * swept * inlet / to_si(gas.suction_MPa, "MPa"),
+        swept, clearance, inlet * filled * swept * rise,
+        filled * swept * inlet / to_si(gas.suction_MPa, "MPa"),
     )  # fmt: skip
 
 

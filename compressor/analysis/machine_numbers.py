@@ -217,6 +217,8 @@ EXPLAINED = {
     "machine.speed_rpm": ("machine.stroke_mm", "gas.bore_mm"),
     "machine.pin_radius_mm": ("clearance_mm",),
     "machine.rod_length_mm": ("machine.rod_centre_mm", "gas.piston_radius_mm"),
+    "machine.rod_mass_kg": LOADS, "machine.rod_inertia_kg_m2": LOADS,
+    "machine.reciprocating_mass_kg": ("gas.bore_mm", *LOADS),
     "gas.suction_MPa": ("gas.bore_mm",),
     "gas.piston_radius_mm": LOADS,
     "gas.rod_diameter_mm": LOADS,
@@ -317,6 +319,7 @@ def _numbers_of_sound(sound: Case) -> Named:
     yield "piston, mean speed", (4e-3 * machine.crank_radius_mm / sound.turn, "m/s")
     yield "rod, crank ratio", (ratio, "")
     if sound.load == "gas":  # behind what tells of a stroke that explains it
+        yield "cylinder, bore", (2.0 * sound.gas.piston_radius_mm, "mm")
         bore_ratio = sound.gas.piston_radius_mm / machine.crank_radius_mm
         yield "cylinder, bore over stroke", (bore_ratio, "")
     centre = (machine.rod_centre_mm or 0.0) / machine.rod_length_mm
@@ -361,7 +364,8 @@ def _numbers_of_gas(sound: Case) -> Named:
         yield "cylinder, indicated power", (1e-3 * rate * work, "kW")
         yield "cylinder, flow at suction", (3600.0 * rate * flow, "m³/h")
     for end, cycle in cycles.items():
-        yield f"cylinder, volumetric efficiency at the {end}", (cycle.volumetric_efficiency, "")
+        filled = cycle.capacity / cycle.swept_volume  # of gas at suction conditions
+        yield f"cylinder, volumetric efficiency at the {end}", (filled, "")
     yield "cylinder, pressure ratio", (gas.discharge_MPa / gas.suction_MPa, "")
     for end, cycle in cycles.items():
         percent = 100.0 * cycle.clearance_volume / cycle.swept_volume
@@ -414,11 +418,11 @@ def _over_cases(
     plain = replace(plain, usual_low=usual.low, usual_high=usual.high)
     key, hint = usual.below if plain.high < usual.low else usual.above
     is_usual = plain.high >= usual.low and plain.low <= usual.high
-    if is_usual or not hint or not any(_is_own(case, usual.keys) for case in cases):
+    if is_usual or not hint or not any(is_own(case, usual.keys) for case in cases):
         return plain
     gas = cases[0].gas if cases[0].load == "gas" else None
     pressures = IN_MPA
-    if name in BEARING and not (gas and (gas.is_measured or _is_own(cases[0], GAS_KEYS))):
+    if name in BEARING and not (gas and (gas.is_measured or is_own(cases[0], GAS_KEYS))):
         key = "lubricant.bearing_length_mm" if cases[0].lubricant else "contact.length_mm"
         hint = SMALL
     if gas and gas.is_measured and key == "gas.discharge_MPa":
@@ -436,7 +440,7 @@ LONG_ROD = 0.05  # crank radius over length: below it the rod is more likely wro
 GAS_KEYS = ("gas.suction_MPa", "gas.discharge_MPa")
 
 
-def _is_own(case: Case, keys: Sequence[str]) -> bool:
+def is_own(case: Case, keys: Sequence[str]) -> bool:
     """Return whether any of some keys differs from the paper's machine."""
     parts = [part for key in keys for part in stands_for(key) or (key,)]
     rows = [row for part in parts if (row := row_of(part))]

@@ -364,14 +364,16 @@ def body_rules(case: Case) -> Rules:
     body, sensor = case.body, case.sensor
     if body is None:
         return
-    share = moving_mass(case) / body.mass_kg
+    moving = moving_mass(case)
+    share = moving / body.mass_kg
     if share > MAX_MOVING_SHARE:
         much = f"{share:.3g} times" if share >= 1 else f"{100 * share:.2g} % of"
         yield (
             "body.mass_kg",
-            f"the moving parts have {much} the body's mass; it is driven one way, which holds up "
-            f"to {100 * MAX_MOVING_SHARE:g} %: give a heavier body, in kg",
+            f"the moving parts, {moving:.6g} kg, have {much} the body's mass; it is driven one "
+            f"way, which holds up to {100 * MAX_MOVING_SHARE:g} %: give a heavier body, in kg",
         )
+        return  # its frequencies speak when the masses are good
     for axis, order in itertools.product(sorted({*body.freedoms[:2]} & {*AXES}), (1, 2)):
         frequency, key = order * case.machine.speed_rpm / 60.0, f"frequency_{axis}_Hz"
         back = abs(back_action(case, axis, frequency))

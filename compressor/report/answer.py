@@ -42,8 +42,8 @@ from compressor.store import Folder, Stored, StoredStudy
 from compressor.units import Units
 
 
-def assumptions_section(has_claims: bool) -> Section:
-    """Return the section of the assumptions behind all studies, and behind the paper's claims."""
+def assumptions_section(has_claims: bool, has_cam: bool) -> Section:
+    """Return the section of the assumptions behind all studies, and the paper's claims and cam."""
     machine = Case.from_values({}).machine
     of_claims = [
         f"The paper prints no masses. These are ours: rod {machine.rod_mass_kg:g} kg (a steel bar "
@@ -55,7 +55,8 @@ def assumptions_section(has_claims: bool) -> Section:
     ]
     lines = [
         "The clearance is radial: bearing radius less journal radius.",
-        "The cam of the spring load is a reconstruction: as printed it does not close.",
+        *["The cam of the spring load is a reconstruction: as printed it does not close."]
+        * has_cam,
         *(of_claims if has_claims else ()),
         "± is the error bar of a number: what a sharper solution of the same model may give. It "
         "tells nothing of the model's own error, and nothing of numbers that had to be guessed, "

@@ -122,7 +122,7 @@ def build_report(
         *chain(*(sections for _, sections in of_own.values())),
         *(one.table for one in drawn),
         *tables,
-        answer.assumptions_section(bool(paper.stored)),
+        answer.assumptions_section(bool(paper.stored), any(map(has_spring, studies))),
         answer.provenance_section(studies, results, command),
     ]
     series = {
@@ -142,6 +142,12 @@ def choose_studies(results: store.Folder, names: Sequence[str]) -> list[StoredSt
         return sorted(store.read_studies(results), key=lambda study: study.is_trial)
     known = store.read_studies(results)
     return [store.find_study(results, name, known) for name in dict.fromkeys(names)]
+
+
+def has_spring(study: StoredStudy) -> bool:
+    """Return whether any job of a study has the spring load."""
+    swept = (axis.values for axis in study.axes if axis.key == "load")
+    return "spring" in (study.fixed["load"], *chain(*swept))
 
 
 class DrawnStudy(NamedTuple):

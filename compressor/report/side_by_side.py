@@ -117,6 +117,11 @@ def _compare(
         "film; a sound bearing has some clearance. "
         f"Beside it {beside}. In parentheses: how many times as much as without clearance."
     )
+    if "sensor_peak" in data:
+        words += (
+            " Ideal joints pass on each kink of the load, which oil and clearance soften: a sensor "
+            "may read more without clearance than with a little."
+        )
     return HealthyAndWorn(words, page.PageTable(["metric", "without clearance", *heads], rows))
 
 

@@ -428,7 +428,12 @@ def list_answer(
     limit = f" {factor * goal.limit:g} {unit}".rstrip() if is_limit else ""
     yield f"{goal.name} {goal.sign}{limit}: {answer.kind}"
     head = {"at": f"{answer.best.argument:.9g}"} if answer.best else {}
-    head["between" if is_limit else "worse from"] = " and ".join(ends)
+    if not is_limit:
+        head["worse from"] = " and ".join(ends)
+    elif answer.kind == "at_low":
+        head["from"] = f"{ends[1]} on, the lower end of the range"
+    elif answer.high:
+        head["between"] = " and ".join(ends)
     value = "lesser" if goal.sign == "least" else "greater"
     missed = "finer changes" if is_limit else f"a {value} value between points"
     head["scan"] = f"{question.scan} points {step}: {missed} may be missed"

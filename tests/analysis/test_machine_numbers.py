@@ -43,8 +43,8 @@ lubricant: {viscosity_mPa_s: 48, bearing_length_mm: 100}
 BY_HAND = {
     "cylinder, indicated power": 78.93,  # kW
     "cylinder, flow at suction": 607.6,  # m3/h
-    "cylinder, volumetric efficiency at the head": 0.7909,
-    "cylinder, volumetric efficiency at the crank": 0.7417,
+    "cylinder, volumetric efficiency at the head": 0.96 * 0.7909,  # before the valve
+    "cylinder, volumetric efficiency at the crank": 0.96 * 0.7417,
     "gas load, tension": 37.1,  # kN
     "gas load, compression": 39.7,
     "rod load, tension": 62.18,

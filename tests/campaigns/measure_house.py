@@ -1,11 +1,11 @@
 """Print the numbers by which the source is compared with that of others.
 
-`measure_house.py [TREE ...]`: files and lines of each room, of the tests, words of the pages; of
+`measure_house.py [TREE]`: files and lines of each room, of the tests, words of the pages; of
 the source its types, its longest function, and what a module imports of its own program.
 """
 
-import argparse
 import ast
+import sys
 from collections import Counter
 from pathlib import Path
 from statistics import mean
@@ -22,46 +22,35 @@ def read_modules(tree: Path) -> dict[Path, str]:
 
 def count_own_imports(module: ast.Module) -> int:
     """Return how many names a module imports from the program itself."""
-    return sum(
-        len(node.names)
-        for node in ast.walk(module)
-        if isinstance(node, ast.ImportFrom)
-        and (node.module or "").split(".")[0] in ("compressor", "compsim")
-    )
+    found = (node for node in ast.walk(module) if isinstance(node, ast.ImportFrom))
+    own = (node for node in found if (node.module or "").startswith(("compressor", "compsim")))
+    return sum(len(node.names) for node in own)
 
 
 def house_numbers(tree: Path) -> dict[str, float | str]:
     """Return the numbers of a tree by name."""
     texts = read_modules(tree)
-    lines: Counter[str] = Counter()
+    lines = Counter[str]()
     for path, text in texts.items():
-        inner = path.parts[0] == "compressor" and len(path.parts) > 2
-        lines["/".join(path.parts[: 1 + inner])] += text.count("\n")
+        is_room = len(path.parts) > 2 and path.parts[0] == "compressor"
+        lines["/".join(path.parts[: 1 + is_room])] += text.count("\n")
     source = [ast.parse(text) for path, text in texts.items() if path.parts[0] != "tests"]
     nodes = [node for module in source for node in ast.walk(module)]
-    functions = [node for node in nodes if isinstance(node, ast.FunctionDef)]
-    longest = max(functions, key=lambda one: (one.end_lineno or 0) - one.lineno)
+    functions = (node for node in nodes if isinstance(node, ast.FunctionDef))
+    size, longest = max(((one.end_lineno or 0) - one.lineno + 1, one.name) for one in functions)
     imports = [count_own_imports(module) for module in source]
-    pages = [path for path in tree.rglob("*.md") if ".venv" not in path.parts]
-    of_source = {room: count for room, count in lines.items() if room != "tests"}
+    pages = (path for path in tree.rglob("*.md") if ".venv" not in path.parts)
     return {
         **{f"lines of {room}": count for room, count in lines.items()},
-        "lines of the source": sum(of_source.values()),
+        "lines of the source": lines.total() - lines["tests"],
         "files of the source": len(source),
         "types": sum(isinstance(node, ast.ClassDef) for node in nodes),
-        f"lines of the longest function, {longest.name}": (
-            (longest.end_lineno or 0) - longest.lineno + 1
-        ),
+        f"lines of the longest function, {longest}": size,
         "own names that a module imports, mean": round(mean(imports), 1),
-        "own names that a module imports, most": max(imports),
         "words of the pages": sum(len(path.read_text("utf-8").split()) for path in pages),
     }
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("tree", nargs="*", type=Path, default=[ROOT], help="checkouts to compare")
-    for checkout in parser.parse_args().tree:
-        print(checkout)
-        for name, number in house_numbers(checkout).items():
-            print(f"  {name:<52} {number:>8,}")
+    for name, number in house_numbers(Path(*sys.argv[1:] or [ROOT])).items():
+        print(f"{name:<52} {number:>8,}")

@@ -94,7 +94,7 @@ def test_the_worn_joint_s_force_and_the_reversal_stand_there_though_they_do_not_
     ]
     found = rank_findings(rows, NAMES, {"small_end"})
     assert [one.title for one in found] == [
-        "Knock (above 0.25 it knocks), small end", "Time without dry contact, big end",
+        "Knock (limit 0.25), small end", "Time without dry contact, big end",
         "Peak rod load, tension", "Rms acceleration",
         "Peak contact force, small end", "Rod load reversal",
     ]  # fmt: skip
