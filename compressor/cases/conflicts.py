@@ -227,7 +227,8 @@ def clearance_rules(case: Case) -> Rules:
             continue
         pin = case.machine.pin_radius_mm.at(joint)
         if clearance > pin:
-            yield key, f"{clearance:g} mm exceeds the pin radius, {pin:g} mm: lower it"
+            told = f"; {clearance:g} µm are {clearance / 1000:g} mm" * (clearance >= 1.0)
+            yield key, f"{clearance:g} mm exceeds the pin radius, {pin:g} mm: lower it{told}"
         shift = math.hypot(*(getattr(case.initial_offset_mm, f"{joint}_{axis}") for axis in AXES))
         if clearance < shift - IMPLAUSIBLE * pin:
             yield (
