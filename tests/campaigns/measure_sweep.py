@@ -24,9 +24,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from chaos.common import contents, damage
 from chaos.processes import Run, members
 from result_pages import keep, provenance, run_campaign
+from stores_compared import contents, damage
 
 from compressor.store.reader import open_study, read_store
 

@@ -1,4 +1,4 @@
-"""`make chaos`: a sample of full disks and power cuts, and what would be seen."""
+"""`make chaos`: a sample of flips, full disks and power cuts, and what would be seen."""
 
 import faulthandler
 import os
@@ -10,15 +10,15 @@ from chaos import common, power
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["faults", "power"])
-def test_nothing_fails_in_a_sample(name, monkeypatch):
+@pytest.mark.parametrize(("name", "trials"), [("faults", 1), ("flips", 5), ("power", 1)])
+def test_nothing_fails_in_a_sample(name, trials, monkeypatch):
     monkeypatch.setattr(power, "JOBS", {"metrics": 100, "series": 3})
     monkeypatch.setattr(power, "MAX_SECONDS", 0.2)
-    found = measure_chaos.run(name, 1)
+    found = measure_chaos.run(name, trials)
     if "skipped" in found:
         pytest.skip(found["skipped"])
     assert found["failures"] == []
-    assert found["trials"] == 1
+    assert found["trials"] == trials
     assert found["counts"].get("acknowledged results", 1) > 0
 
 

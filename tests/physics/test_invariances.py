@@ -9,10 +9,10 @@ import itertools
 
 import numpy as np
 import pytest
-from chaos.common import contents
 from conftest import jobs_here, write_cases
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from stores_compared import contents
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies

@@ -10,10 +10,10 @@ import bad_jobs
 import distributed
 import numpy as np
 import pytest
-from chaos.common import contents, differing
 from compsim.cli import main
 from conftest import jobs_here, wait_for, write_cases
 from dask import config
+from stores_compared import contents, differing
 
 from compressor.cases.load import load_studies
 from compressor.store import reader as store

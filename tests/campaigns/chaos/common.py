@@ -1,13 +1,12 @@
 """What the campaigns share: small studies, forked processes, what a store holds.
 
-A campaign is a module with WHAT is tried and a function `trial(place, draw, number, counts)`. It
-does harm in an empty folder, draws at random how, and returns what went wrong, "" for nothing. What
-trials share is made once, beside that folder.
+A campaign is a module with WHAT is tried and `trial(place, draw, number, counts)`, which does harm
+in an empty folder, drawn at random, and returns what went wrong, or "". What trials share lies
+beside.
 """
 
 import contextlib
 import faulthandler
-import hashlib
 import itertools
 import json
 import multiprocessing
@@ -16,26 +15,23 @@ import subprocess
 import sys
 import tempfile
 import traceback
+from collections import namedtuple
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
 
-import numpy as np
 from click.testing import CliRunner
 from compsim import cli
+from stores_compared import contents
 
 from compressor.cases.load import load_studies
-from compressor.store.files import StoreError
-from compressor.store.status import verify
 from compressor.store.stored import read_store
-from compressor.store.studies import read_studies
+from compressor.store.studies import read_study, study_paths
 from compressor.sweep.worker import End
 
 SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 FORK = multiprocessing.get_context("fork")
 SECONDS = 60.0  # in which a trial must end; what hangs takes for ever
-TIMED = "seconds"
 FOREIGN = ("case", "name")  # attributes that depend on which of several studies ran a job
 LEAN = {  # of a quick job
     "duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9,
@@ -77,43 +73,12 @@ def complete_store(folder):
     return folder / "complete", cases, whole(folder / "complete")
 
 
-def contents(folder, foreign=()):
-    """Key -> a digest of all that is stored of a job but the seconds that it took.
-
-    foreign: attributes that do not count.
-    """
-    stored, found = read_store(folder), {}
-    for position in np.argsort(stored.places[1]):  # a batch at a time, which stays in memory
-        key, one = stored.columns["job"][position], stored.outcome(position)
-        parts = [one.status, one.reason]
-        parts += [one.numbers[name].tobytes() for name in one.numbers.dtype.names if name != TIMED]
-        parts += [(name, one.attributes[name]) for name in one.attributes if name not in foreign]
-        for name, (dims, values, attrs) in stored.series([position])[0].items():
-            parts += [name, dims, values.dtype.char, values.tobytes(), attrs]
-        found[key.decode()] = hashlib.sha256(repr(parts).encode()).hexdigest()
-    return found
-
-
 def whole(folder):
     """All that is stored, studies too; raises StoreError where any is damaged."""
     for error in read_store(folder).damaged:
         raise error
-    studies = {one.name: replace(one, written="", command="") for one in read_studies(folder)}
-    return contents(folder) | studies
-
-
-def differing(found, expected):
-    """The names of what differs, "" where nothing does."""
-    names = sorted(found.keys() | expected.keys())
-    return ", ".join(name for name in names if found.get(name) != expected.get(name))
-
-
-def damage(folder):
-    """What is wrong with a store, in a line; empty where all is well, or nothing was stored."""
-    try:
-        return "; ".join(map(str, verify(folder)))
-    except StoreError as error:
-        return "" if not list(folder.glob("batches/*.h5")) else str(error)
+    studies = map(read_study, study_paths(folder))
+    return contents(folder) | {one.name: replace(one, written="", command="") for one in studies}
 
 
 @contextlib.contextmanager
@@ -141,11 +106,8 @@ def mounted(place, *words):
         call("umount", "-l", place)
 
 
-class Ended(NamedTuple):
-    """How a forked process ended: what its work gave, or how it died."""
-
-    result: Any
-    death: str = ""  # "" where it gave a result
+# how a forked process ended: what its work gave, or how it died, else ""
+Ended = namedtuple("Ended", "result death", defaults=[""])
 
 
 def forked(work, seconds=SECONDS):
@@ -173,12 +135,7 @@ def forked(work, seconds=SECONDS):
     return ended or Ended(None, died)
 
 
-class Said(NamedTuple):
-    """What a command said."""
-
-    code: int
-    out: str
-    err: str
+Said = namedtuple("Said", "code out err")  # by a command
 
 
 def command(*words):

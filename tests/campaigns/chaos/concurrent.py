@@ -1,11 +1,15 @@
 """Two to four runs on one store at once: none may lose or mix anything, or wait for another.
 
-Each run starts at its own random moment, as the real command or a fork of it, and must end with all
-that it was asked for in the store, to the bit, whatever the others have done of it meanwhile.
+Each starts at a random moment, as the real command or a fork of it, and must end with all that it
+was asked for in the store, to the bit, whatever the others have done of it meanwhile.
 """
 
-from chaos.common import FOREIGN, contents, damage, rods_file
+import itertools
+
+from chaos.common import FOREIGN, rods_file
 from chaos.processes import MASSES, Run, hurried, undisturbed
+from stores_compared import contents, damage
+
 from compressor.cases.load import load_studies
 from compressor.store.studies import read_studies
 
@@ -16,16 +20,17 @@ REAL = 10  # one trial in so many is of real commands
 
 
 def arrange(folder, draw):
-    """Two to four commands: of one study or of some that share jobs, whole or in shards."""
-    count, commands = draw.randint(2, 4), []
-    names = [f"study-{n}" for n in range(draw.choice((1, count)))]
-    for name in names:
+    """Two to four commands, of one study or of some that share jobs, and the part each asks for."""
+    count, files, commands, asked = draw.randint(2, 4), [], [], []
+    for number in range(draw.choice((1, count))):
         first = draw.randrange(len(MASSES) // 2)
-        rods_file(folder, name, MASSES[first : first + len(MASSES) // 2], draw.choice(KEEPS))
-    for number in range(count):
-        shard = ["--shard", f"{number + 1}/{count}"] if draw.random() < 0.5 else []
-        commands.append([f"{names[number % len(names)]}.yaml", *shard])
-    return commands
+        masses = MASSES[first : first + len(MASSES) // 2]
+        files.append(rods_file(folder, f"study-{number}", masses, draw.choice(KEEPS)))
+    for number, file in zip(range(1, count + 1), itertools.cycle(files), strict=False):
+        (study,), is_part = load_studies(file), draw.random() < 0.5
+        asked.append(study.shard(number, count) if is_part else study)
+        commands.append([file.name, *["--shard", f"{number}/{count}"][: 2 * is_part]])
+    return commands, asked
 
 
 def together(folder, commands, draw, real):
@@ -39,34 +44,25 @@ def together(folder, commands, draw, real):
     return runs, [run.finish() for run in runs]
 
 
-def requested(folder, command):
-    """The keys of the jobs that a command asks for."""
-    (study,) = load_studies(folder / command[0])
-    if "--shard" in command:
-        study = study.shard(*map(int, command[-1].split("/")))
-    return {study.keys[number] for number in study.selected}
-
-
 def trial(place, draw, number, counts):
     """Start runs together."""
-    commands, is_real = arrange(place, draw), number % REAL == 0
+    (commands, studies), is_real = arrange(place, draw), number % REAL == 0
     runs, codes = together(place, commands, draw, is_real)
     problems = [
         f"{command}: {code}: {run.text()[-500:]}"
         for run, command, code in zip(runs, commands, codes, strict=True) if code
     ]  # fmt: skip
-    problems += [text for text in [damage(place / "out")] if text]
-    found, asked = contents(place / "out", FOREIGN), set()
-    asked.update(*(requested(place, command) for command in commands))
+    problems += filter(None, [damage(place / "out")])
+    found = contents(place / "out", FOREIGN)
+    asked = {study.keys[number] for study in studies for number in study.selected}
     if found.keys() != asked:
         problems.append(f"{len(asked)} jobs were asked for, {len(found)} are stored")
     single = [undisturbed(place.parent, keep)[1] for keep in KEEPS]
     for key, content in found.items():
         if content not in {of.get(key) for of in single}:
             problems.append(f"job {key} is none that a single run stores")
-    names = {command[0].removesuffix(".yaml") for command in commands}
-    manifests = {study.name: set(study.keys) for study in read_studies(place / "out")}
-    if manifests != {name: set(load_studies(place / f"{name}.yaml")[0].keys) for name in names}:
+    listed = {study.name: study.keys for study in read_studies(place / "out")}
+    if listed != {study.name: study.keys for study in studies}:
         problems.append("a study lists other jobs than it has")
     _, again = together(place, commands, draw, False)
     if any(again) or contents(place / "out", FOREIGN) != found:

@@ -1,14 +1,16 @@
 """Disks that are full or read-only, as a command meets them.
 
-A small file system in memory (tmpfs) has too few bytes or files at every stage of a run or an
-export, or is mounted read-only. Whatever it refuses: exit code 5 and a named error on stderr (or,
-if it was not needed, success), and the same command then completes the store. Errors of single
-calls are in `tests/store/test_damage.py`.
+A small file system in memory (tmpfs) has too few bytes or files for a command, or is read-only.
+Whatever it refuses: exit code 5 and a named error (or, if it was not needed, success), and the same
+command then completes the store. Errors of single calls are in `tests/store/test_damage.py`.
 """
 
 import os
 import random
+import re
 import shutil
+
+from stores_compared import differing
 
 from chaos import common
 from compressor.store import merge
@@ -30,6 +32,7 @@ SCENES = {
     "plan": ("complete", "plan CASES -r FOLDER"),
 }
 READERS = ("status", "verify", "show", "plan")
+NAMED = re.compile("(?m)^compsim: /.*: .*; ")  # a place, a problem and a remedy
 # room of a tmpfs beyond what is there; a complete store has 70 kB
 ROOM = [("pages", n) for n in range(0, 40, 2)] + [("files", n) for n in range(12)]
 PLANNED = [(name, "ro", 0) for name in SCENES]
@@ -70,8 +73,8 @@ def say(words):
         merge.MAX_SMALL = 1
         return common.command(*words)
 
-    ended = common.forked(work)
-    return ended.result or common.Said(-1, "", ended.death)
+    result, death = common.forked(work)
+    return result or common.Said(-1, "", death)
 
 
 def trial(place, draw, number, counts):
@@ -87,26 +90,18 @@ def trial(place, draw, number, counts):
         used = os.statvfs(disk)
         pages, files = used.f_blocks - used.f_bfree, used.f_files - used.f_ffree
         room = max(pages + more, 1) * used.f_frsize  # 0 would be without a limit
-        options = {"ro": "ro", "pages": f"size={room}",
-                   "files": f"size=64m,nr_inodes={files + more}"}  # fmt: skip
-        common.call("mount", "-o", f"remount,{options[kind]}", disk)
-        said, problem = say(words), ""
+        limits = {"ro": "ro", "pages": f"size={room}", "files": f"nr_inodes={files + more}"}
+        common.call("mount", "-o", f"remount,{limits[kind]}", disk)
+        said = say(words)
         is_ok = said.code in (0, 3)
-        is_told = is_ok or (name not in READERS and said.code in (2, 5) and is_named(said.err))
+        is_named = len(NAMED.findall(said.err)) == 1 or "damaged file" in said.err
+        is_told = is_ok or (name not in READERS and said.code in (2, 5) and is_named)
         counts["limits that were not met" if is_ok else "named errors"] += 1
         common.call("mount", "-o", f"remount,rw,{AMPLE}", disk)
         again, found = say(words), common.forked(lambda: common.whole(store))
+    problem = found.death or differing(found.result, expected)
     if "Traceback" in said.err or not is_told:
-        problem = f"exit code {said.code}: {said.err}"
+        problem = str(said)
     elif again.code not in (0, 3):
-        problem = f"given again: exit code {again.code}: {again.err}"
-    elif different := found.death or common.differing(found.result, expected):
-        problem = f"not completed: {different}"
+        problem = f"given again: {again}"
     return problem and f"{name} on tmpfs, {kind} {more}: {problem}"
-
-
-def is_named(err):
-    """Whether a message names a place, a problem and a remedy, once."""
-    lines = [line for line in err.splitlines() if line.startswith("compsim: /")]
-    told = len(lines) == 1 and ": " in lines[0][9:] and "; " in lines[0]
-    return told or "damaged file" in err

@@ -1,14 +1,16 @@
 """Bit flips, truncations and zeroed blocks in the files of a store.
 
-Each trial damages one file. `verify` must find and name it, or else nothing that is read of the
-store may change; every reader must give what the undamaged store gives, or say by an error or a
-warning that it does not; the run that made the store must mend it. Nothing may crash or hang.
+`verify` must find and name the file, or nothing that is read of the store may change; every reader
+must give what the undamaged store gives, or say that it does not; the run that made the store must
+mend it. Nothing may crash or hang.
 """
 
 import shutil
 from functools import partial
 
-from chaos.common import command, complete_store, differing, forked, run_here, whole
+from chaos.common import command, complete_store, forked, run_here, whole
+from stores_compared import differing
+
 from compressor.store.files import StoreError
 from compressor.store.stored import read_store
 
@@ -72,8 +74,7 @@ def trial(place, draw, number, counts):
     store = shutil.copytree(complete, place / "store")
     kind = draw.choice(("batches", "studies"))
     file = draw.choice(sorted((complete / kind).iterdir())).relative_to(complete)
-    keys = sorted(read_store(complete).keys())
-    reader = draw.choice(READERS).replace("KEY", draw.choice(keys))
+    reader = draw.choice(READERS).replace("KEY", draw.choice(sorted(read_store(complete).keys())))
     was = forked(lambda: command(*reader.split(), "-r", store)).result
     how, data = hurt((complete / file).read_bytes(), draw)
     (store / file).write_bytes(data)

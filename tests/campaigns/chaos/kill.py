@@ -1,25 +1,26 @@
 """SIGKILL at a random moment: of the parent, of a worker, of all at once; then the same command.
 
-Acknowledged is what the killed run has told on its terminal, and what could be read while all of it
-stood still just before the kill. None of it may be lost or run again, no file may be torn, nothing
-may run on, and the resumed study must equal an undisturbed one to the bit, timings apart. Jobs that
-a killed worker has stored but not told of may run twice: the rest of the run cannot know of them.
+Acknowledged is what the killed run has told, and what could be read while all stood still just
+before. None of it may be lost or run again, no file be torn, nothing run on, and the resumed study
+must equal an undisturbed one to the bit, timings apart. What a killed worker has stored, but not
+told of, may run twice: the rest of the run cannot know of it.
 """
 
 import os
 import signal
 
 import numpy as np
+from stores_compared import TIMED, contents, damage
 
-from chaos.common import FOREIGN, TIMED, contents, damage
+from chaos.common import FOREIGN
 from chaos.processes import members, start, undisturbed
 from compressor.store.stored import read_store
 
 WHAT = "SIGKILL of the parent, a worker or both at a random moment, then resumed"
-VICTIMS = ("parent", "worker", "both")
 EARLY = 0.15  # share of the kills that may come before the first file
 AMID = 0.5  # share of the later ones that wait for a file to be half-written
 MAX_FILES = 8  # for one of which a later kill waits
+UNFINISHED = "**/.*.tmp"  # files that a killed writer has left
 REAL = 3  # one trial in so many is the real command
 
 
@@ -30,17 +31,11 @@ def taken(folder):
     return dict(zip(stored.columns["job"].tolist(), seconds.tolist(), strict=True))
 
 
-def unfinished(folder):
-    """Temporary files that a killed writer has left."""
-    return [*folder.glob("**/.*.tmp")]
-
-
 def strike(run, victim, draw):
     """Kill; whether it was a worker, and there was one."""
     if victim != "worker":
         run.send(signal.SIGKILL, whole=victim == "both")
-        return False
-    while run.watch(0.002):
+    while victim == "worker" and run.watch(0.002):
         if workers := [pid for pid in members(run.pid) if pid != run.pid]:
             os.kill(draw.choice(workers), signal.SIGKILL)
             return True
@@ -51,7 +46,8 @@ def trial(place, draw, number, counts):
     """Kill a sweep and resume it."""
     keep, is_real = draw.choice(("metrics", "series")), number % REAL == 0
     seconds, whole = undisturbed(place.parent, keep, is_real)
-    victim, early, amid = draw.choice(VICTIMS), draw.random() < EARLY, draw.random() < AMID
+    victim = draw.choice(("parent", "worker", "both"))
+    early, amid = draw.random() < EARLY, draw.random() < AMID
     run, files, out = start(place, keep, is_real), draw.randint(1, MAX_FILES), place / "out"
     if early:
         run.watch(draw.uniform(0, seconds))
@@ -60,12 +56,12 @@ def trial(place, draw, number, counts):
     run.send(signal.SIGSTOP, whole=True)
     before = taken(out)
     run.send(signal.SIGCONT, whole=True)
-    while amid and not early and run.watch(0.0) and not unfinished(place):
+    while amid and not early and run.watch(0.0) and not [*place.glob(UNFINISHED)]:
         pass
     worker_struck = strike(run, victim, draw)
     code = run.finish()
     struck = worker_struck or code == -signal.SIGKILL  # or it was leaving, with 0
-    after, left, torn = taken(out), unfinished(place), damage(out)
+    after, left, torn = taken(out), [*place.glob(UNFINISHED)], damage(out)
     anew = [key for key in before.keys() & after.keys() if before[key] != after[key]]
     again = start(place, keep, is_real)
     resumed = again.finish()
@@ -82,9 +78,8 @@ def trial(place, draw, number, counts):
         "differs from an undisturbed study": contents(out, FOREIGN) != whole,
     }  # fmt: skip
     moment = "after the end" if not struck else "amid the rows" if before else "before any row"
-    counts.update([f"{victim} killed", f"killed {moment}"])
+    counts.update([f"{victim} killed", f"killed {moment}", *["real commands"] * is_real])
     counts["acknowledged results"] += max(len(before), run.told())
     counts["with half-written files"] += bool(left)
     counts["with jobs stored, not told of, that ran twice"] += bool(anew)
-    counts["real commands"] += is_real
     return "; ".join(text for text, wrong in problems.items() if wrong)

@@ -8,9 +8,10 @@ import itertools
 import re
 from functools import partial
 
+from stores_compared import contents, damage
 from sweep.bad_jobs import LEAST, POISON
 
-from chaos.common import FOREIGN, SWEEP, contents, damage, rods_file
+from chaos.common import FOREIGN, SWEEP, rods_file
 from chaos.processes import MASSES, Run, undisturbed
 from compressor.cases.load import load_studies
 from compressor.store.stored import read_store
@@ -76,7 +77,7 @@ def trial(place, draw, number, counts):
             problems.append(f"{kind}, job {key}: {end}")
         if not re.search(rf": {reason}: .*; job {key}\n", run.text()):
             problems.append(f"{kind}, job {key}: not named on the terminal")
-    problems += [text for text in [damage(place / "out")] if text]
+    problems += filter(None, [damage(place / "out")])
     counts.update(bad.values())
     counts["good jobs"] += len(good)
     return "; ".join(problems)

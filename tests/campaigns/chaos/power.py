@@ -1,12 +1,10 @@
 """Power cuts: the file system is cut off while a sweep writes, and what the disk holds is resumed.
 
 The store lies on an ext4 file system in an image file. At a random moment FS_IOC_SHUTDOWN, without
-flushing the journal, stops all its writing at once, as a power cut would (xfstests does the same);
-the image is then what had reached the disk, and is copied. The copy is checked by e2fsck, mounted,
-compared with all that had been acknowledged, and the sweep is resumed on it. A disk that keeps
-written blocks in a volatile cache is not modelled: ext4 asks it to flush them where we sync.
-
-The campaign proves itself: with fsync taken out of the program, acknowledged results are lost.
+flushing the journal, stops all its writing, as xfstests does. A copy of the image, which has what
+had reached the disk, is checked by e2fsck, mounted, compared with what had been acknowledged, and
+the sweep is resumed on it. A volatile cache of the disk is not modelled: ext4 has it flushed where
+we sync. With fsync taken out of the program acknowledged results are lost.
 """
 
 import contextlib
@@ -14,7 +12,6 @@ import fcntl
 import itertools
 import math
 import os
-import select
 import shutil
 import signal
 import struct
@@ -22,6 +19,8 @@ import time
 from functools import cache
 
 from chaos import common
+from stores_compared import differing
+
 from compressor.cases.load import load_studies
 from compressor.store import merge
 from compressor.store.status import verify
@@ -40,16 +39,14 @@ JOBS = {"metrics": 1000, "series": 21}
 
 def unable(folder):
     """Why power cannot be cut here; "" where it can: the folder then has an `empty.img`."""
-    image = folder / "empty.img"
+    image, tried = folder / "empty.img", folder / "tried.img"
     with open(image, "wb") as file:
         file.truncate(IMAGE_BYTES)
     try:
         common.call("mkfs.ext4", "-q", "-F", "-E", "lazy_itable_init=0,lazy_journal_init=0", image)
-        with common.fresh(folder) as place:
-            shutil.copyfile(image, place / "disk.img")
-            with common.mounted(place / "disk", "-o", "loop", place / "disk.img") as disk:
-                cut(disk)
-            common.call("e2fsck", "-fy", place / "disk.img", good=(0, 1))
+        with common.mounted(folder / "tried", "-o", "loop", shutil.copyfile(image, tried)) as disk:
+            cut(disk)
+        common.call("e2fsck", "-fy", tried, good=(0, 1))
     except (RuntimeError, OSError) as error:
         return str(error)
     return ""
@@ -58,20 +55,16 @@ def unable(folder):
 def cut(place):
     """Cut a file system off, at once, without writing what it still holds in memory."""
     root = os.open(place, os.O_RDONLY)
-    try:
-        fcntl.ioctl(root, SHUTDOWN, NO_FLUSH)
-    finally:
-        os.close(root)
+    fcntl.ioctl(root, SHUTDOWN, NO_FLUSH)
+    os.close(root)
 
 
 def next_of(reader, seconds):
-    """What is told over a pipe next, or nothing in some seconds."""
-    if not select.select([reader], [], [], seconds)[0]:
-        return ""
-    data = os.read(reader, 1 << 20)
-    if not data:
-        time.sleep(min(seconds, MAX_SECONDS))  # the sweep is over
-    return data.decode()
+    """The keys that are told over a pipe next, none in some seconds."""
+    with contextlib.suppress(EOFError):
+        return reader.recv() if reader.poll(seconds) else []
+    time.sleep(min(seconds, MAX_SECONDS))  # the sweep is over
+    return []
 
 
 @cache
@@ -103,7 +96,7 @@ def write(studies, store, channel, is_synced, every):
         numbers = itertools.count(1)
 
         def stored(keys):
-            os.write(channel, "".join(f"{key}\n" for key in keys).encode())
+            channel.send(keys)
             if next(numbers) % every == 0:  # more often than the program does
                 merge.merge_batches(store)
 
@@ -116,24 +109,25 @@ def disturb(place, studies, draw, is_synced):
     shutil.copyfile(place.parent / "empty.img", place / "disk.img")
     options, wait = draw.choice(OPTIONS), draw.uniform(0, MAX_SECONDS)
     promptly = not is_synced or draw.random() < 0.5  # upon an acknowledgement
-    reader, channel = os.pipe()
+    reader, channel = common.FORK.Pipe(duplex=False)
     with common.mounted(place / "disk", "-o", f"loop,{options}", place / "disk.img") as disk:
         arguments = studies, disk / "store", channel, is_synced, draw.choice((8, math.inf))
         child = common.FORK.Process(target=write, args=arguments)
         child.start()
-        os.close(channel)
-        told = next_of(reader, 60)
+        channel.close()
+        told = {*next_of(reader, 60)}
         until = time.monotonic() + wait
         while (left := until - time.monotonic()) > 0:
-            told += next_of(reader, left)
-        told += next_of(reader, 5) if promptly else ""
+            told.update(next_of(reader, left))
+        told.update(next_of(reader, 5) if promptly else ())
         cut(disk)
         shutil.copyfile(place / "disk.img", place / "cut.img")
         child.join(30)
         with contextlib.suppress(ProcessLookupError):
             os.killpg(child.pid, signal.SIGKILL)
-    with open(reader, encoding="ascii") as file:
-        return set((told + file.read()).split())
+    while more := next_of(reader, 0):
+        told.update(more)
+    return told
 
 
 def intact(store):
@@ -152,15 +146,14 @@ def cut_once(place, draw, is_synced=True):
         if not is_synced:
             return acknowledged, lost, ""
         again = common.forked(lambda: swept(studies, disk / "store"), LONG)
-        return acknowledged, lost, again.death or common.differing(again.result, expected)
+        return acknowledged, lost, again.death or differing(again.result, expected)
 
 
 def trial(place, draw, number, counts):
     """Cut the power; now and then see that it costs results where nothing is synced."""
     acknowledged, lost, different = cut_once(place, draw)
     counts["acknowledged results"] += len(acknowledged)
-    problems = [f"lost {len(lost)}"] if lost else []
-    problems += [f"not resumed: {different}"] if different else []
+    problems = [f"lost {len(lost)}"] * bool(lost) + [f"not resumed: {different}"] * bool(different)
     if number % CONTROL_EVERY == 1:
         counts["controls without fsync"] += 1
         if not cut_once(place, draw, is_synced=False)[1]:

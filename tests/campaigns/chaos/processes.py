@@ -15,9 +15,10 @@ import time
 from functools import cache, partial
 from pathlib import Path
 
+from chaos.common import FOREIGN, FORK, SWEEP, fresh, rods_file
 from compsim.cli import main
+from stores_compared import contents
 
-from chaos.common import FOREIGN, FORK, SWEEP, contents, fresh, rods_file
 from compressor.sweep.worker import Workers
 
 PROGRESS = re.compile(rb"(\d+) of \d+ jobs, \d+ %")
@@ -64,8 +65,7 @@ class Run:
 
     def finish(self, seconds=120.0, orphans=5.0):
         """Wait for its end, and that of all it started; its exit code, or what went wrong."""
-        late = self.watch(seconds)
-        if late:
+        if late := self.watch(seconds):
             self.send(signal.SIGKILL, whole=True)
             self.watch(5.0)
         deadline = time.monotonic() + orphans
@@ -76,16 +76,13 @@ class Run:
                 os.kill(pid, signal.SIGKILL)
         self.read()
         os.close(self.master)
-        if late:
-            return f"ran for more than {seconds:g} s"
-        return (
-            f"{len(left)} processes outlived it by {orphans:g} s" if left else self.child.exitcode
-        )
+        if late or left:
+            return f"{late=} by {seconds:g} s, {len(left)} processes outlived it by {orphans:g} s"
+        return self.child.exitcode
 
     def told(self):
         """How many stored jobs its progress has told of: those that it has acknowledged."""
-        found = PROGRESS.findall(self.terminal)
-        return int(found[-1]) if found else 0
+        return int((PROGRESS.findall(self.terminal) or [0])[-1])
 
     def text(self):
         """All that its terminal has shown."""

@@ -1,1 +1,0 @@
-"""Fault injection: what must survive, tried many times."""
