@@ -13,7 +13,7 @@ def main() -> int:
     from compsim import cli
 
     code = cli.main()
-    gc.freeze()  # nor is what ends with the program: to look at it took a quarter of a second
+    gc.freeze()  # nor is what ends with the program: to look at it took up to half a second
     return code
 
 

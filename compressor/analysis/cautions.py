@@ -31,6 +31,7 @@ from compressor.cases import (
     stands_for,
     to_si,
     value_of,
+    values_given,
 )
 from compressor.metrics import JOINTS
 from compressor.physics import elastic_form, greatest_load
@@ -198,26 +199,15 @@ def check_machine(case: Case) -> Remarks:
             f"that of yours is not: drawn rods have up to {HEAVY_ENDS:g} times as much, and at "
             f"most {apart:.3g}, with all mass in their bores; it moves the forces across the rod"
         )  # fmt: skip
-    if machine.rod_inertia_kg_m2 != bar and apart and (machine.rod_inertia_kg_m2 or 0.0) > apart:
+    if (machine.rod_inertia_kg_m2 or 0.0) > apart > 0.0:
         yield key, (
-            f"{machine.rod_inertia_kg_m2:g} kg m2 is more than {apart:.3g}, with all mass in the "
+            f"{machine.rod_inertia_kg_m2:.4g} kg m2 is more than {apart:.3g}, with all mass in the "
             "rod's bores; it is about the rod's mass centre"
         )  # fmt: skip
     if radius > LONGEST_CRANK * length:
         yield "machine.crank_radius_mm", (
             f"{radius:g} mm is {radius / length:.2g} of the rod's length, more than the usual "
             f"{LONGEST_CRANK:g}: the crank radius is half the stroke"
-        )  # fmt: skip
-
-
-def check_cylinder(case: Case) -> Remarks:
-    """Yield the paper's bore beside a stroke or a rod of one's own."""
-    keys = "machine.crank_radius_mm", "machine.rod_length_mm", "gas.piston_radius_mm"
-    *has_own_lengths, has_own_bore = (is_own(case, [key]) for key in keys)
-    if case.load == "gas" and any(has_own_lengths) and not has_own_bore:
-        yield "gas.bore_mm", (
-            f"{2 * case.gas.piston_radius_mm:g} mm is the paper's, and stroke or rod are not: give "
-            "gas.bore_mm and the pressures of your cylinder"
         )  # fmt: skip
 
 
@@ -347,7 +337,7 @@ def check_friction(case: Case) -> Remarks:
 
 Check = Callable[[Case], Remarks]
 CHECKS: tuple[Check, ...] = (
-    check_machine, check_cylinder, check_judged, check_paper_pin, check_body, check_depth,
+    check_machine, check_judged, check_paper_pin, check_body, check_depth,
     check_rod, check_cards, check_friction,
 )  # fmt: skip
 
@@ -357,6 +347,17 @@ def remarks(case: Case) -> Iterator[tuple[Check, str, str]]:
     for check in CHECKS:
         for key, message in dict(check(case)).items():
             yield check, key, message
+
+
+def lacks_cylinder(study: Study, cases: Sequence[Case]) -> Iterator[Caution]:
+    """Yield the paper's bore, where a study does not give one beside its own stroke or rod."""
+    lengths = ("machine.crank_radius_mm", "machine.rod_length_mm")
+    own = [case for case in cases if case.load == "gas" and is_own(case, lengths)]
+    given = {key for block in study.fixed for key in values_given(block)}
+    given |= {axis.key for axis in study.axes}
+    if own and given.isdisjoint(("gas.bore_mm", "gas.piston_radius_mm")):
+        text = f"{2 * own[0].gas.piston_radius_mm:g} mm is the paper's, beside a stroke or a rod of"
+        yield Caution("gas.bore_mm", f"{text} your own: give yours", len(own), len(cases))
 
 
 def cautions(study: Study) -> list[Caution]:
@@ -378,4 +379,4 @@ def cautions(study: Study) -> list[Caution]:
             units[key] = units[key]._replace(message=message)
         elif key not in units and not (units and check is check_depth):
             told.append(one)
-    return [*units.values(), *told]
+    return [*units.values(), *lacks_cylinder(study, cases), *told]

@@ -374,8 +374,8 @@ def body_rules(case: Case) -> Rules:
             f"the moving parts, {moving:.6g} kg, have {much} the body's mass; it is driven one "
             f"way, which holds up to {100 * MAX_MOVING_SHARE:g} %: give a heavier body, in kg",
         )
-        return  # its frequencies speak when the masses are good
-    for axis, order in itertools.product(sorted({*body.freedoms[:2]} & {*AXES}), (1, 2)):
+    axes = sorted({*body.freedoms[:2]} & {*AXES}) if share <= MAX_MOVING_SHARE else ()
+    for axis, order in itertools.product(axes, (1, 2)):
         frequency, key = order * case.machine.speed_rpm / 60.0, f"frequency_{axis}_Hz"
         back = abs(back_action(case, axis, frequency))
         if back > MAX_BACK_ACTION:

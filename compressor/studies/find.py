@@ -218,7 +218,7 @@ class SearchResult:
     """What a search found.
 
     kind: `found`; `undecided`: found, but points inside the interval cannot be decided; `at_low`:
-    the comparison holds from the range's lower end on; `nowhere`: it holds at no point; `unclear`:
+    the comparison holds at the range's lower end; `nowhere`: it holds at no point; `unclear`:
     no point surely meets the goal, and some say nothing.
     low, high: the ends of the interval. Of a comparison: where it does not hold and where it first
     does; low is None where no point below surely fails. Of an extremum: the nearest points that are
@@ -418,7 +418,7 @@ def list_answer(
 ) -> Iterator[str]:
     """Yield an answer as it is printed: where it lies, and a row for each point."""
     goal, (unit, factor) = question.goal, units.unit_in(question.goal.unit, system)
-    ends = [f"{one.argument:.9g}" if one else "none" for one in (answer.low, answer.high)]
+    ends = [f"{one.argument:.9g}" for one in (answer.low, answer.high) if one]
     span, steps = question.span, question.scan - 1
     if span.log:
         step = f"a factor {(span.high / span.low) ** (1 / steps):.4g} apart"
@@ -428,12 +428,11 @@ def list_answer(
     limit = f" {factor * goal.limit:g} {unit}".rstrip() if is_limit else ""
     yield f"{goal.name} {goal.sign}{limit}: {answer.kind}"
     head = {"at": f"{answer.best.argument:.9g}"} if answer.best else {}
-    if not is_limit:
-        head["worse from"] = " and ".join(ends)
-    elif answer.kind == "at_low":
-        head["from"] = f"{ends[1]} on, the lower end of the range"
-    elif answer.high:
-        head["between"] = " and ".join(ends)
+    if answer.kind == "at_low":
+        head["at"] = f"{ends[0]} already, the lower end of the range"
+    elif ends:
+        at_all = "between" if ends[1:] else "at or below"
+        head[at_all if is_limit else "worse from"] = " and ".join(ends)
     value = "lesser" if goal.sign == "least" else "greater"
     missed = "finer changes" if is_limit else f"a {value} value between points"
     head["scan"] = f"{question.scan} points {step}: {missed} may be missed"

@@ -45,6 +45,7 @@ BY_HAND = {
     "cylinder, flow at suction": 607.6,  # m3/h
     "cylinder, volumetric efficiency at the head": 0.96 * 0.7909,  # before the valve
     "cylinder, volumetric efficiency at the crank": 0.96 * 0.7417,
+    "cylinder, bore": 267,  # mm
     "gas load, tension": 37.1,  # kN
     "gas load, compression": 39.7,
     "rod load, tension": 62.18,
@@ -120,6 +121,12 @@ def test_a_mistake_is_remarked_on_with_its_key(name, read):
     if key == "gas.clearance_percent":
         text = text.replace("{head: 17, crank: 21}", "{head: 0.17, crank: 0.21}")
     assert list(describe_machine(read(text)).remarks()) == [key]
+
+
+def test_a_mass_in_grams_is_not_blamed_on_the_pressures(read):
+    study = read(NAMEPLATE.replace("rod_mass_kg: 54", "rod_mass_kg: 54000"))
+    machine, warned = describe_machine(study), {one.key for one in cautions(study)}
+    assert "gas.discharge_MPa" in machine.remarks().keys() - machine.remarks(warned).keys()
 
 
 CARDS = "\n".join(["crank_angle_deg,head_pressure_bar,crank_pressure_bar", *(

@@ -139,7 +139,7 @@ def test_an_override_stands_in_place_of_the_files_value(write, text, overrides, 
         (["joint=[none"], "--set joint=[none: is no YAML: expected ',' or ']', "
          "but got '<stream end>'"),
         (["clearance_mm=[1, 11]"], "--set clearance_mm=[1, 11]: clearance_mm: "
-         "11 mm exceeds the pin radius, 10 mm: lower it"),
+         "11 mm exceeds the pin radius, 10 mm: lower it; 11 µm are 0.011 mm"),
         (["name=x"], "--set name=x: name: a.yaml and b.yaml would be stored under one name, x"),
     ],
 )  # fmt: skip

@@ -17,7 +17,7 @@ from conftest import damage_series, keep, part_of, store, store_cases, without_p
 
 from compressor.analysis import last_revolution, paper_cases
 from compressor.analysis.runs import CLEARANCES, FAULTS, case_of, label
-from compressor.cases import Case, load_cases, load_studies
+from compressor.cases import Axis, Case, load_cases, load_studies
 from compressor.program import CompsimWarning
 from compressor.reasons import Reason
 from compressor.report import inputs, interactive, write_report
@@ -26,6 +26,7 @@ from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.table import spell
 from compressor.report.interactive import draw_job
 from compressor.report.paper_sections import comparable, find_runs
+from compressor.report.report import has_spring
 from compressor.store import StoreWarning, read_job, read_store, read_studies, study_caveats
 from compressor.store.studies import encode, write_study
 
@@ -290,6 +291,10 @@ def test_a_sweep_has_its_table_and_plots(own, tmp_path, units, unit, size):
     assert len(found.sources) == 2
     head = next(cells for _, cells in found.rows if cells[0] == "clearance_mm")
     assert head[:4] == ["clearance_mm", "rod_mass_kg", "status", f"peak acceleration ({unit})"]
+    assert "The cam of the spring load is" in found.text
+    gas = replace(read_studies(own)[0], fixed={"load": "gas"}, axes=())
+    assert not has_spring(gas)
+    assert has_spring(replace(gas, axes=(Axis("load", ("spring",)),)))
     rows = {key: cells for key, (_, cells) in found.jobs.items()}
     (study,) = read_studies(own)
     for key, point in zip(study.keys, [(0.1, 3), (0.1, 5), (0.2, 3), (0.2, 5)], strict=True):

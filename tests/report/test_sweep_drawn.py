@@ -54,7 +54,9 @@ def test_keys_that_change_together_are_a_curve():
     (curve,) = panels_of(drawn.figure)[0].traces
     assert (*curve.x, *curve.customdata) == (0.1, 0.2, 0.3, "k1", "k2", "k0")
     assert drawn.sentence.startswith("Every metric against big (small with it), a point a job")
-    assert "points" in plan(listed(worn | {"small": [0.03, 0.01, 0.04]}, [300, 100, 200]))
+    for other in ([0.03, 0.01, 0.04], [0.03, 0.012345678, 0.02], ["c", "a", "b"]):  # turned, drawn
+        assert "points" in plan(listed(worn | {"small": other}, [300, 100, 200]))
+    assert "points" in plan(listed({key: some[:2] for key, some in worn.items()}, [300, 100]))
 
 
 def test_noise_is_no_trend():

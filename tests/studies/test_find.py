@@ -18,7 +18,7 @@ from compressor.outcome import ROW
 from compressor.solve.simulate import simulate
 from compressor.store import read_store, read_studies
 from compressor.studies import find
-from compressor.studies.frame import StudyError
+from compressor.studies.frame import KeySpan, StudyError
 
 SCAN = [number / 8 for number in range(9)]
 FAILED = find.JobReading(reason="the job failed, budget_steps: more than 5 steps")
@@ -94,6 +94,17 @@ def test_nothing_changes(value, bar, kind):
     assert found.kind == kind
     assert calls == [SCAN]
     assert len(found.blind) == (9 if kind == "unclear" else 0)
+
+
+@pytest.mark.parametrize(("values", "line"), [
+    ((2.0, 0.5), "at 0 already, the lower end of the range"), ((0.5, 2.0), "between 0 and 10"),
+    ((None, 2.0), "at or below 10"), ((0.5, 0.5), "scan 9 points 1.25 apart: finer changes"),
+])  # fmt: skip
+def test_an_answer_says_where_it_lies(values, line):
+    answer = find.interval(jobs(lambda x: values[int(x)])([0.0, 1.0]), ABOVE.holds)
+    question = find.Question("f.yaml", KeySpan("clearance_mm", 0.0, 10.0), ABOVE)
+    _, said, *_ = find.list_answer(question, answer, "results", "si")
+    assert " ".join(said.split()).startswith(line)
 
 
 def test_noise_ends_where_it_is_told():

@@ -63,7 +63,7 @@ def draw_sweep(
         return [*draw_sampled(sweep, shown, about)]
     if len(sweep.axes) == 1:
         (axis,) = sweep.axes
-        along = f" ({' and '.join(others)} with it)" * bool(others)
+        along = f" ({', '.join(others)} with it)" * bool(others)
         sentence = (
             f"Every metric against {axis.phrase}{along}, a point a job, with error bars where one "
             "is long enough to be seen."
@@ -71,7 +71,7 @@ def draw_sweep(
         return [DrawnFigure(
             sweep_panels.draw_curves(sweep, shown, limits), sentence,
             [*count_drawn(axis, sweep_panels.MAX_JOBS), *about],
-            zone_words(shown, limits), axis.name, f"metrics against {axis.phrase}{along}",
+            zone_words(shown, limits), axis.name, f"metrics against {axis.phrase}",
         )]  # fmt: skip
     return [*draw_grid(sweep, shown, about, limits)]
 

@@ -1,5 +1,6 @@
 """A study as its sweep is drawn: its metrics, its axes, and its jobs in a grid or a list."""
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -251,8 +252,11 @@ def join_zipped(sweep: PlottedSweep) -> PlottedSweep:
         return sweep
     order = np.argsort(first.places)
     steps = [np.diff(axis.places[order]) for axis in sweep.axes]
-    if first.values.size < 3 or not all((one > 0).all() or (one < 0).all() for one in steps):
-        return sweep  # of two jobs everything does
+    values = itertools.chain.from_iterable(axis.values.tolist() for axis in sweep.axes)
+    is_typed = all(float(f"{value:.6g}") == value for value in values)  # and not drawn
+    is_few = first.values.size < (3 if is_typed else 5)  # draws may happen to do so
+    if is_few or not all((one > 0).all() or (one < 0).all() for one in steps):
+        return sweep
     data = sweep.data.isel(job=order).swap_dims(job=first.name)
     return PlottedSweep(data, (replace(first, values=first.values[order]),))
 

@@ -1,8 +1,7 @@
 """What the campaigns share: small studies, forked processes, what a store holds.
 
 A campaign is a module with WHAT is tried and `trial(place, draw, number, counts)`, which does harm
-in an empty folder, drawn at random, and returns what went wrong, or "". What trials share lies
-beside.
+in an empty folder, as drawn, and returns what went wrong, or "". What trials share lies beside.
 """
 
 import contextlib
