@@ -6,10 +6,10 @@ was asked for in the store, to the bit, whatever the others have done of it mean
 
 import itertools
 
-from chaos.common import FOREIGN, rods_file
-from chaos.processes import MASSES, Run, hurried, undisturbed
 from stores_compared import contents, damage
 
+from chaos.common import FOREIGN, rods_file
+from chaos.processes import MASSES, Run, hurried, undisturbed
 from compressor.cases.load import load_studies
 from compressor.store.studies import read_studies
 

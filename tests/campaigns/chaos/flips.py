@@ -8,9 +8,9 @@ mend it. Nothing may crash or hang.
 import shutil
 from functools import partial
 
-from chaos.common import command, complete_store, forked, run_here, whole
 from stores_compared import differing
 
+from chaos.common import command, complete_store, forked, run_here, whole
 from compressor.store.files import StoreError
 from compressor.store.stored import read_store
 

@@ -18,9 +18,9 @@ import struct
 import time
 from functools import cache
 
-from chaos import common
 from stores_compared import differing
 
+from chaos import common
 from compressor.cases.load import load_studies
 from compressor.store import merge
 from compressor.store.status import verify

@@ -15,10 +15,10 @@ import time
 from functools import cache, partial
 from pathlib import Path
 
-from chaos.common import FOREIGN, FORK, SWEEP, fresh, rods_file
 from compsim.cli import main
 from stores_compared import contents
 
+from chaos.common import FOREIGN, FORK, SWEEP, fresh, rods_file
 from compressor.sweep.worker import Workers
 
 PROGRESS = re.compile(rb"(\d+) of \d+ jobs, \d+ %")
