@@ -324,8 +324,10 @@ def _numbers_of_sound(sound: Case) -> Named:
         yield "cylinder, bore over stroke", (bore_ratio, "")
     centre = (machine.rod_centre_mm or 0.0) / machine.rod_length_mm
     yield "rod, mass centre over length", (centre, "")
-    pins = sum(machine.pin_radius_mm.at(joint) for joint in JOINTS)
-    yield "rod, both pins over length", (pins / machine.rod_length_mm, "")
+    has_pins = is_own(sound, ["machine.pin_radius_mm"])  # else the paper's, of joints with play
+    if has_pins:
+        pins = sum(machine.pin_radius_mm.at(joint) for joint in JOINTS)
+        yield "rod, both pins over length", (pins / machine.rod_length_mm, "")
     if sound.load != "none":
         yield from _both_sides(f"{sound.load} load", loads.gas)
     inertia = machine.reciprocating_mass_kg * machine.crank_radius_mm * sound.omega**2 * 1e-6
@@ -347,7 +349,8 @@ def _numbers_of_sound(sound: Case) -> Named:
         yield "piston rod, stress", (peak / (math.pi / 4.0 * rod**2), "MPa")
     for joint, peak in zip(JOINTS, loads.sizes.max(axis=0), strict=True):
         name = joint.replace("_", " ")
-        yield f"{name}, pin diameter", (2.0 * machine.pin_radius_mm.at(joint), "mm")
+        if has_pins:
+            yield f"{name}, pin diameter", (2.0 * machine.pin_radius_mm.at(joint), "mm")
         yield f"{name}, peak load", (1e-3 * float(peak), "kN")
 
 
@@ -391,6 +394,8 @@ def _numbers_of_pins(case: Case, sound: dict[str, tuple[float, str]]) -> Named:
         if not clearance:
             continue
         pin = 2.0 * case.machine.pin_radius_mm.at(joint)
+        if f"{name}, pin diameter" not in sound:
+            yield f"{name}, pin diameter", (pin, "mm")
         yield f"{name}, diametral clearance", (2.0 * clearance, "mm")
         yield f"{name}, clearance over pin", (2e3 * clearance / pin, "‰")
         length = case.contact.length_mm.at(joint) if case.contact.length_mm else 0.0

@@ -14,12 +14,6 @@ ROOT = Path(__file__).parents[2]
 ROOMS = ("cmd", "compressor", "tests")
 
 
-def read_modules(tree: Path) -> dict[Path, str]:
-    """Return the text of each module of a tree, by its path from there."""
-    paths = (path for top in ROOMS for path in sorted((tree / top).rglob("*.py")))
-    return {path.relative_to(tree): path.read_text(encoding="utf-8") for path in paths}
-
-
 def count_own_imports(module: ast.Module) -> int:
     """Return how many names a module imports from the program itself."""
     found = (node for node in ast.walk(module) if isinstance(node, ast.ImportFrom))
@@ -29,7 +23,8 @@ def count_own_imports(module: ast.Module) -> int:
 
 def house_numbers(tree: Path) -> dict[str, float | str]:
     """Return the numbers of a tree by name."""
-    texts = read_modules(tree)
+    paths = (path for top in ROOMS for path in sorted((tree / top).rglob("*.py")))
+    texts = {path.relative_to(tree): path.read_text(encoding="utf-8") for path in paths}
     lines = Counter[str]()
     for path, text in texts.items():
         is_room = len(path.parts) > 2 and path.parts[0] == "compressor"
