@@ -206,18 +206,19 @@ def sources_hash(folder: Path) -> str:
 
 
 def machine_code_folder() -> Path:
-    """Return the folder of machine code, named by a hash of the sources.
+    """Return the folder of machine code, named by a hash of the sources and numba's version.
 
     It is in NUMBA_CACHE_DIR if that is set, else beside the sources, else in the user's cache.
     Raises NoCodeFolder where nothing can be written. Numba itself would go on using a caller's old
-    code after a change of what it calls in another file.
+    code after a change of what it calls in another file, and may read another version's halfway
+    through its own.
     """
     named = os.environ.get(CODE_VARIABLE)
     cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # as it is, homeless
     usual = (COMPILED / "__pycache__", Path(cache) / "compsim")
     for place in (Path(named).absolute() / "compsim",) if named else usual:
         if place.is_absolute() and _can_write(place):
-            return place / f"numba-{sources_hash(COMPILED)}"
+            return place / f"numba-{sources_hash(COMPILED)}-{metadata.version('numba')}"
     where = named or f"beside {COMPILED} or in the user's cache"
     text = f"nothing can be written to {where}, where machine code would be kept"
     raise NoCodeFolder(f"{text}: set {CODE_VARIABLE} to a folder that stays")

@@ -30,7 +30,8 @@ def discard_other_code(folder: Path) -> None:
     """Remove the machine code of other sources, before that of the present ones is first made."""
     if not folder.exists():
         for old in folder.parent.glob("numba-*"):
-            shutil.rmtree(old, ignore_errors=True)
+            if old.name.split("-")[1] != folder.name.split("-")[1]:
+                shutil.rmtree(old, ignore_errors=True)
 
 
 class Deferred:
