@@ -349,7 +349,7 @@ def remarks(case: Case) -> Iterator[tuple[Check, str, str]]:
             yield check, key, message
 
 
-def lacks_cylinder(study: Study, cases: Sequence[Case]) -> Iterator[Caution]:
+def tell_cylinder(study: Study, cases: Sequence[Case]) -> Iterator[Caution]:
     """Yield the paper's bore, where a study does not give one beside its own stroke or rod."""
     lengths = ("machine.crank_radius_mm", "machine.rod_length_mm")
     own = [case for case in cases if case.load == "gas" and is_own(case, lengths)]
@@ -379,4 +379,4 @@ def cautions(study: Study) -> list[Caution]:
             units[key] = units[key]._replace(message=message)
         elif key not in units and not (units and check is check_depth):
             told.append(one)
-    return [*units.values(), *lacks_cylinder(study, cases), *told]
+    return [*units.values(), *tell_cylinder(study, cases), *told]

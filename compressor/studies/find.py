@@ -431,8 +431,8 @@ def list_answer(
     if answer.kind == "at_low":
         head["at"] = f"{ends[0]} already, the lower end of the range"
     elif ends:
-        at_all = "between" if ends[1:] else "at or below"
-        head[at_all if is_limit else "worse from"] = " and ".join(ends)
+        where = "between" if ends[1:] else "at or below"
+        head[where if is_limit else "worse from"] = " and ".join(ends)
     value = "lesser" if goal.sign == "least" else "greater"
     missed = "finer changes" if is_limit else f"a {value} value between points"
     head["scan"] = f"{question.scan} points {step}: {missed} may be missed"
