@@ -198,7 +198,10 @@ def _study(
     axes = tuple(Axis(key, tuple(values[key])) for key in columns)
     fixed = tuple(expand_synonyms(block.fixed)[0] for block in blocks)
     told = {name: text or "" for name, text in vars(file.report).items()}
-    study = Study(file.name, file.path, axes, cases, keys, is_grid, selected, fixed, **told)
+    is_curve = len(blocks) == 1 and len(blocks[0].factors) == 1 and not draws(blocks[0])
+    study = Study(
+        file.name, file.path, axes, cases, keys, is_grid, selected, fixed, **told, is_curve=is_curve
+    )
     return study, blocks
 
 

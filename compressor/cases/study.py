@@ -407,6 +407,7 @@ class Study:
     Otherwise every axis is a column, with a value for each job, None where the job has none.
     `title` and `notes` are what the page of the report says of the machine, "" without; `figures`:
     whose figures it draws of it, `paper` for the paper's.
+    `is_curve`: its jobs are along one key, or several that are zipped.
     `fixed` has the values that are not swept, group by group as each block of the file gives them.
     """
 
@@ -421,6 +422,7 @@ class Study:
     title: str = ""
     notes: str = ""
     figures: str = ""
+    is_curve: bool = False
 
     @property
     def jobs(self) -> int:

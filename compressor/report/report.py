@@ -178,7 +178,7 @@ def drawn_study(
     with store.label_studies(stored, [study]) as data:
         named: list[tuple[str, DrawnFigure]] = []
         if not study.figures:
-            swept = draw_sweep(data, limits, units)
+            swept = draw_sweep(data, limits, units, study.is_curve)
             turns = draw_for_page(stored, study, data, units)
             named = [(study_section.file_name("sweep", study.name, one.name), one) for one in swept]
             named += [(study_section.file_name(one.name, study.name), one) for one in turns]

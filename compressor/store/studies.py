@@ -63,6 +63,7 @@ class StoredStudy:
     given: tuple[str, ...] = ()  # keys that the file gives, and does not sweep
     overrides: tuple[str, ...] = ()  # KEY=VALUE that the command line set in the file
     figures: str = ""  # whose figures the page draws of it: `paper`, or "" for its sweep
+    is_curve: bool = False  # its jobs are along one key, or several that are zipped
 
     @property
     def jobs(self) -> int:
@@ -143,6 +144,7 @@ def write_study(
         tuple(dict.fromkeys(key for block in study.fixed for key in values_given(block))),
         tuple(overrides),
         study.figures,
+        study.is_curve,
     )
     path = Path(folder) / "studies" / f"{study.name}.json"
     with contextlib.suppress(StoreError, FileNotFoundError):  # one that is damaged is replaced

@@ -98,7 +98,9 @@ def test_zipped_keys_advance_together(read):
     assert [axis.key for axis in study.axes] == ["load", "clearance_mm", "machine.speed_rpm"]
     pairs = [(0.1, 300.0), (0.2, 400.0), (0.1, 500.0)]
     assert rows(study) == [(load, *pair) for load in ("none", "spring") for pair in pairs]
-    assert not study.is_grid
+    assert (study.is_grid, study.is_curve) == (False, False)
+    file = "load: [none, spring]\nclearance_mm: [0.1, 0.2]\nzip: [[load, clearance_mm]]\n"
+    assert read(ONE + file).is_curve
 
 
 SAMPLED = """\

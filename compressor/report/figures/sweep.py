@@ -42,19 +42,20 @@ CORRELATED = 0.5  # correlation of ranks of two keys, beyond which they go toget
 
 
 def draw_sweep(
-    data: xr.Dataset, limits: Limits = NO_LIMITS, units: Units = "usual"
+    data: xr.Dataset, limits: Limits = NO_LIMITS, units: Units = "usual", is_curve: bool = False
 ) -> list[DrawnFigure]:
     """Return the drawings of a study, as `open_study` gives it; curves show limits of metrics.
 
     None where nothing is swept or measured. What is the same at every job is a number of a caption,
-    and not drawn.
+    and not drawn. is_curve: the jobs are along one key, or several that are zipped.
     """
     known = measures(data, units)
     sweep = sweep_of(data)
     if not known or not sweep.axes:
         return []
-    others = [axis.phrase for axis in sweep.axes[1:]]
-    sweep = join_zipped(sweep)
+    swept = sweep.axes
+    if is_curve and not sweep.is_grid:
+        sweep = join_zipped(sweep)
     shown, same = split_measures(sweep, known)
     if not shown:
         shown, same = known, []
@@ -63,7 +64,8 @@ def draw_sweep(
         return [*draw_sampled(sweep, shown, about)]
     if len(sweep.axes) == 1:
         (axis,) = sweep.axes
-        along = f" ({', '.join(others)} with it)" * bool(others)
+        others = ", ".join(one.phrase for one in swept if one.name != axis.name)
+        along = f" ({others} with it)" * bool(others)
         sentence = (
             f"Every metric against {axis.phrase}{along}, a point a job, with error bars where one "
             "is long enough to be seen."

@@ -1,6 +1,5 @@
 """A study as its sweep is drawn: its metrics, its axes, and its jobs in a grid or a list."""
 
-import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -243,22 +242,13 @@ def sweep_of(data: xr.Dataset) -> PlottedSweep:
 
 
 def join_zipped(sweep: PlottedSweep) -> PlottedSweep:
-    """Return jobs whose keys all rise or fall together, as keys that are zipped, as a curve.
-
-    Over the first of them; others are returned as they are.
-    """
-    first = sweep.axes[0]
-    if sweep.is_grid or len(sweep.axes) < 2 or any(axis.is_words for axis in sweep.axes):
-        return sweep
-    order = np.argsort(first.places)
-    steps = [np.diff(axis.places[order]) for axis in sweep.axes]
-    values = itertools.chain.from_iterable(axis.values.tolist() for axis in sweep.axes)
-    is_typed = all(float(f"{value:.6g}") == value for value in values)  # and not drawn
-    is_few = first.values.size < (3 if is_typed else 5)  # draws may happen to do so
-    if is_few or not all((one > 0).all() or (one < 0).all() for one in steps):
-        return sweep
-    data = sweep.data.isel(job=order).swap_dims(job=first.name)
-    return PlottedSweep(data, (replace(first, values=first.values[order]),))
+    """Return jobs of keys that are zipped as a curve, over the first whose numbers all differ."""
+    for axis in sweep.axes:
+        if not axis.is_words and np.unique(axis.places).size == axis.places.size:
+            order = np.argsort(axis.places)
+            data = sweep.data.isel(job=order).swap_dims(job=axis.name)
+            return PlottedSweep(data, (replace(axis, values=axis.values[order]),))
+    return sweep
 
 
 def coarse(sweep: PlottedSweep, axis: int, most: int) -> PlottedSweep:
