@@ -14,7 +14,6 @@ import os
 import pickle
 import platform
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -23,6 +22,7 @@ from collections.abc import Callable, Generator, Hashable, Iterable, Iterator
 from dataclasses import replace
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import send_handle
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -31,15 +31,7 @@ from joblib import Parallel, cpu_count, delayed
 from compressor.program import THREAD_VARIABLES, CompsimError
 from compressor.reasons import Reason
 from compressor.store import StoreError
-from compressor.sweep.worker import (
-    ENDING,
-    NO_WORKER,
-    End,
-    Store,
-    Workers,
-    WorkersFailed,
-    open_socket,
-)
+from compressor.sweep.worker import NO_WORKER, End, Store, Workers, WorkersFailed
 
 Input = tuple[Hashable, Any, float]  # id, payload, wall time that the job may take (s)
 
@@ -267,15 +259,12 @@ class Loader:
     def __init__(self, setup: bytes):
         self.calls, theirs = Pipe()
         self.lock = threading.Lock()  # a call at a time
-        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # in it, too, until it settles
-        try:
+        with theirs:
             self.process = subprocess.Popen(
                 [sys.executable, "-c", START, str(theirs.fileno())], pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL, env=os.environ | dict.fromkeys(THREAD_VARIABLES, "1"),
+                process_group=0,  # its own, with its copies: Ctrl-C is for us alone
             )  # fmt: skip
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-            theirs.close()
         with contextlib.suppress(OSError):  # it has died, as a call will find
             self.calls.send(sys.path)
             self.calls.send_bytes(setup)
@@ -294,20 +283,20 @@ class Loader:
         with self.lock, contextlib.suppress(EOFError, OSError):
             self.calls.send(pid)
             if pipe:
-                with open_socket(self.calls) as carrier:
-                    socket.send_fds(carrier, [b"1"], [pipe.fileno()])
+                send_handle(self.calls, pipe.fileno(), self.process.pid)
             return receive(self.calls, MAX_SILENCE)
         self.end()
         raise Death(describe_ending(self.process.returncode))
 
     def end(self) -> None:
-        """End the process, which ends its copies; where it is at work still, kill it."""
-        with contextlib.suppress(OSError), open_socket(self.calls) as carrier:
-            carrier.shutdown(socket.SHUT_RDWR)  # other threads may wait for an answer
-        try:
-            self.process.wait(0 if self.lock.locked() else END_SECONDS)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
+        """End the process, which ends its copies; where it is at work still, kill all."""
+        if self.lock.acquire(blocking=False):  # nobody waits for an answer
+            self.calls.close()
+            self.lock.release()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self.process.wait(END_SECONDS)
+        if self.process.poll() is None:
+            os.killpg(self.process.pid, signal.SIGKILL)
             self.process.wait()
 
 

@@ -4,13 +4,13 @@ import contextlib
 import gc
 import os
 import signal
-import socket
 import sys
 import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import recv_handle
 from typing import Any, NamedTuple
 
 from compressor.program import CompsimError, die_with_parent
@@ -23,9 +23,6 @@ NO_WORKER = (
     "no worker process can be started: {}; allow more processes and files (ulimit -u, -n), or use "
     "fewer workers (-j)"
 )
-ENDING = [signal.SIGINT, signal.SIGTERM]
-if hasattr(signal, "SIGHUP"):  # not on Windows
-    ENDING.append(signal.SIGHUP)
 
 Store = Callable[[list[Any]], list[Any]]  # of results; returns what is sent home for each
 
@@ -95,15 +92,14 @@ def serve(calls: Connection) -> None:
 def answer_calls(calls: Connection) -> Connection | None:
     """Make and end workers; return the pipe of one in its process, None at the end of `calls`."""
     workers: set[int] = set()
-    with contextlib.suppress(EOFError, OSError, ValueError):  # of what was cut short, too
+    with contextlib.suppress(EOFError, OSError, RuntimeError):  # of what was cut short, too
         while True:
             if pid := calls.recv():
                 workers.discard(pid)
                 os.kill(pid, signal.SIGKILL)
                 calls.send(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
                 continue
-            with open_socket(calls) as carrier:
-                _, (file,), _, _ = socket.recv_fds(carrier, 1, 1)
+            file = recv_handle(calls)
             try:
                 pid = os.fork()
             except OSError as error:
@@ -120,11 +116,6 @@ def answer_calls(calls: Connection) -> Connection | None:
     for pid in workers:
         os.waitpid(pid, 0)
     return None
-
-
-def open_socket(pipe: Connection) -> socket.socket:
-    """Return the socket that a pipe is made of, to be closed."""
-    return socket.socket(fileno=os.dup(pipe.fileno()))
 
 
 def serve_batches(
@@ -153,10 +144,9 @@ def serve_batches(
 def settle() -> None:
     """Make this process a worker: its end, signals and streams."""
     die_with_parent()
-    for number in (signal.SIGINT, signal.SIGHUP):  # Ctrl-C reaches all: the parent ends us
+    for number in (signal.SIGINT, signal.SIGHUP):  # which are for the parent: it ends us
         signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # ignored, exit codes would be lost
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
     with contextlib.suppress(OSError):  # there may be no stderr
         os.dup2(2, 1)  # stdout is for data
 

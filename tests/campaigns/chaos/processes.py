@@ -60,8 +60,9 @@ class Run:
 
     def send(self, number, whole=False):
         """Send a signal to itself alone, or to the whole session at once."""
-        with contextlib.suppress(ProcessLookupError):  # it may have ended
-            (os.killpg if whole else os.kill)(self.pid, number)
+        for pid in members(self.pid) if whole else [self.pid]:
+            with contextlib.suppress(ProcessLookupError):  # it may have ended
+                os.kill(pid, number)
 
     def finish(self, seconds=120.0, orphans=5.0):
         """Wait for its end, and that of all it started; its exit code, or what went wrong."""
