@@ -35,7 +35,6 @@ from compressor.store.files import Folder, FolderLost, StoreError, make_folder, 
 from compressor.store.netcdf import (
     dimensions_of,
     encode_netcdf,
-    is_text,
     open_netcdf,
     read_attributes,
     read_bytes,
@@ -83,8 +82,6 @@ def name_of(label: str) -> str:
     """Return the name of a labelled number, without joint, axis and so on."""
     return label.partition(".")[0]
 
-
-ALL = np.arange(ROW.itemsize // 8)  # places of all numbers
 
 Rows = tuple[dict[str, np.ndarray], list[str]]  # job, `WORDS`, samples, end_time; labels of numbers
 
@@ -213,7 +210,7 @@ def read_tables(path: Path) -> tuple[np.ndarray, np.ndarray]:
     with open_netcdf(path) as file:
         values, errors = (file[name][()] for name in TABLES)
         labels = read_bytes(file["metric"]).astype(str).tolist()
-    count, columns = len(labels), np.full(len(ALL) + 1, -1)
+    count, columns = len(labels), np.full(ROW.itemsize // 8 + 1, -1)
     # the last place is of labels without a bar, and of those of another version of the program
     columns[[ERRORS.get(label, -1) for label in labels]] = range(count, 2 * count)
     columns[[VALUES.get(label, -1) for label in labels]] = range(count)
@@ -247,23 +244,18 @@ def read_series(
     if not found:
         return []
     with open_netcdf(path) as file:
-        every, counts = [*file], {}
+        every = [*file]
         is_single = np.char.find(read_bytes(file["kept"]), b"double") < 0
-        for name in every if names is None else names:
-            if name not in file or name in TABLES:
-                continue
+        for name in every if names is None else [one for one in names if one in every]:
             data = file[name]  # not `get`, to which what is damaged is absent
             dims = dimensions_of(data, every)[1:]
-            if not dims or is_text(data):
+            lengths = [file[f"{dim}s"][()] for dim in dims if f"{dim}s" in every]
+            if not lengths:
                 continue
-            for dim in dims:
-                if dim not in counts and dim not in LABELS:
-                    counts[dim] = file[f"{dim}s"][()]
             attrs = read_attributes(data)
             absent = {*np.ravel(attrs.pop("absent", ())).tolist()}
             # stored as doubles beside others
             singles = is_single & ("sample" in dims and name not in ABSCISSAE)
-            lengths = [counts[dim] for dim in dims if dim not in LABELS]
             dims = [DIMENSIONS.get(dim, dim) for dim in dims]
             source = data[()] if len(rows) == len(data) else data  # one read for all jobs
             for one, row in zip(found, rows, strict=True):
@@ -272,29 +264,6 @@ def read_series(
                     kind = np.dtype("f4") if singles[row] else data.dtype
                     one[name] = Variable(tuple(dims), values.astype(kind, copy=False), attrs)
     return found
-
-
-def read_outcomes(path: Path) -> list[Outcome]:
-    """Return all that a batch holds, to be merged with others.
-
-    Raises DamagedFile also for numbers of another version, which only that one can read.
-    """
-    with open_netcdf(path):  # HDF5 shares a file that is open: what is read below opens it at once
-        columns, labels = read_batch(path)
-        if not {*labels} <= VALUES.keys():
-            raise ValueError
-        numbers = read_numbers(path, range(len(columns["job"])), ALL)
-        series = iter(read_series(path, np.flatnonzero(columns["samples"]).tolist()))
-        return [
-            Outcome(
-                columns["status"][row].decode(),
-                columns["reason"][row].decode(),
-                values.view(ROW)[0],
-                read_attributes_of(path, row),
-                next(series) if columns["samples"][row] else {},
-            )
-            for row, values in enumerate(numbers)
-        ]
 
 
 def batch_paths(folder: Folder) -> list[Path]:

@@ -1,22 +1,22 @@
 """Keep a folder of results tidy: merge small batches, set damaged ones aside."""
 
 import contextlib
+import itertools
 import math
 from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
 
-from compressor.store.batch import encode_batch, publish_batch, read_outcomes
-from compressor.store.files import Folder, discard_leftovers, refusals
-from compressor.store.netcdf import DamagedFile
-from compressor.store.stored import read_store
+from compressor.store.batch import encode_batch, publish_batch
+from compressor.store.files import Folder, StoreError, discard_leftovers, refusals
+from compressor.store.stored import Stored, read_store
 
 MAX_JOBS, MAX_BYTES = 4096, 32_000_000  # of a merged batch
 SMALL = 0.25  # part of either, below which a batch is small
 MAX_SMALL = 8  # small batches that may stay
 
-Counting = tuple[Path, list[int], float]  # a batch, its rows that count, its part of a merged one
+Counting = tuple[Path, np.ndarray, float]  # a batch, its jobs that count, its part of a merged one
 
 
 def merge_batches(folder: Folder) -> set[str]:
@@ -33,19 +33,19 @@ def merge_batches(folder: Folder) -> set[str]:
         stored = read_store(folder)
         for damage in stored.damaged:
             set_aside(Path(damage.path))
-        paths, source, row = stored.places
+        paths, source, _ = stored.places
         small: dict[int, list[Counting]] = defaultdict(list)
         for number, path in enumerate(paths):
-            mine = np.flatnonzero(source == number)
-            share = _share(path, mine.size)
-            if not mine.size:
+            jobs = np.flatnonzero(source == number)
+            share = _share(path, jobs.size)
+            if not jobs.size:
                 path.unlink(missing_ok=True)
-            elif share < SMALL:
-                length = int(stored.columns["samples"][mine].max())  # alike, lest series grow
-                small[length].append((path, np.sort(row[mine]).tolist(), share))
+            elif share < SMALL and path not in stored.foreign:
+                length = int(stored.columns["samples"][jobs].max())  # alike, lest series grow
+                small[length].append((path, jobs, share))
         if sum(map(len, small.values())) > MAX_SMALL:
             for alike in small.values():
-                _merge_alike(folder, alike)
+                _merge_alike(stored, alike)
         return stored.keys()
 
 
@@ -62,22 +62,17 @@ def _share(path: Path, jobs: int) -> float:
     return math.inf
 
 
-def _merge_alike(folder: Path, batches: list[Counting]) -> None:
-    """Merge batches in groups that are large enough."""
-    numbers = np.cumsum([share for *_, share in batches]).astype(int)  # of each one's group
-    for number in np.unique(numbers):
-        group = [one for one, its in zip(batches, numbers, strict=True) if its == number]
-        if len(group) > 1:
-            _merge_group(folder, group)
-
-
-def _merge_group(folder: Path, group: list[Counting]) -> None:
-    """Write one batch in place of several, unless one is damaged, gone or of another version."""
-    outcomes = []
-    with contextlib.suppress(DamagedFile, FileNotFoundError):
-        for path, rows, _ in group:
-            found = read_outcomes(path)
-            outcomes += [found[row] for row in rows]
-        publish_batch(folder, encode_batch(outcomes), group[-1][0].name[:20])
-        for path, *_ in group:
+def _merge_alike(stored: Stored, batches: list[Counting]) -> None:
+    """Merge batches in groups that are large enough, but those with one that cannot be read."""
+    sums = itertools.accumulate(share for *_, share in batches)
+    grouped = itertools.groupby(zip(sums, batches, strict=True), lambda one: int(one[0]))
+    for paths, jobs, _ in (zip(*(one for _, one in group), strict=True) for _, group in grouped):
+        if len(paths) < 2:
+            continue
+        try:
+            outcomes = stored.outcomes(np.concatenate(jobs))
+        except StoreError:
+            continue
+        publish_batch(stored.folder, encode_batch(outcomes), paths[-1].name[:20])
+        for path in paths:
             path.unlink(missing_ok=True)

@@ -131,11 +131,6 @@ def open_netcdf(path: Path, remedy: str = REMEDY) -> Iterator[Any]:
         raise DamagedFile(path, "is damaged, or no file of compsim's", remedy) from error
 
 
-def is_text(data: Any) -> bool:
-    """Return whether a variable has texts, as an axis of characters."""
-    return "_Encoding" in data.attrs
-
-
 def read_bytes(data: Any) -> np.ndarray:
     """Return the texts of a variable as bytes."""
     values = np.ascontiguousarray(data[()])
@@ -183,7 +178,7 @@ def read_dataset(path: Path, remedy: str = REMEDY) -> "xr.Dataset":
             data, dims = file[name], dimensions_of(file[name], names)
             if data.attrs.get("NAME", b"").startswith(BARE):
                 continue
-            if is_text(data):
+            if "_Encoding" in data.attrs:  # texts, with an axis of characters
                 values = np.char.decode(read_bytes(data), "utf-8")
                 dims = dims[:-1]
             else:

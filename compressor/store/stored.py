@@ -22,6 +22,7 @@ from compressor.outcome import ROW, Outcome, Variable
 from compressor.store.batch import (
     ERRORS,
     OF_JOBS,
+    VALUES,
     WORDS,
     Rows,
     batch_paths,
@@ -57,7 +58,8 @@ class Stored:
 
     Of several rows of a job the most complete one counts (`completeness`), of equals the one that
     was written later. `columns`: those of batches (`batch.Rows`), a value a job; `given`: the names
-    of the numbers that every job has, or some batch; `damaged`: the batches that cannot be read.
+    of the numbers that every job has, or some batch; `damaged`: the batches that cannot be read;
+    `foreign`: those with numbers of another version, which only that one can read.
     Jobs are named by their positions; methods that read a batch raise DamagedFile, and StoreError
     where a job is gone meanwhile.
     """
@@ -67,17 +69,15 @@ class Stored:
     ):
         self.folder, self.damaged = folder, damaged
         self.checked: dict[Path, bool] = {}
-        found = {name: [np.zeros(0, "S1")] for name in ("job", *WORDS)}
-        found |= {"samples": [np.zeros(0, int)], "end_time": [np.zeros(0)]}
-        labels: set[str] = set()
-        for columns, more in batches.values():
-            labels.update(more)
-            for name, values in columns.items():
-                found[name].append(values)
-        counts = [*map(len, found["job"][1:])]
-        whole = {name: np.concatenate(found.pop(name)) for name in [*found]}
-        source = np.repeat(np.arange(len(counts)), counts)
-        row = np.concatenate([np.zeros(0, int), *map(np.arange, counts)])
+        labels = {label for _, more in batches.values() for label in more}
+        self.foreign = {path for path, (_, more) in batches.items() if not VALUES.keys() >= {*more}}
+        none = dict.fromkeys(("job", *WORDS), np.zeros(0, "S1"))
+        none |= {"samples": np.zeros(0, int), "end_time": np.zeros(0)}
+        parts = [none, *(columns for columns, _ in batches.values())]
+        whole = {name: np.concatenate([part[name] for part in parts]) for name in none}
+        counts = [len(part["job"]) for part in parts]
+        source = np.repeat(np.arange(-1, len(batches)), counts)
+        row = np.concatenate([*map(np.arange, counts)])
         order = np.lexsort((source, completeness(whole), whole["job"]))
         keys = whole["job"][order]
         at = order[np.append(keys[1:] != keys[:-1], True)[: len(keys)]]
@@ -228,6 +228,15 @@ class Stored:
         """Return the outcome of a job, without its time series."""
         status, reason = (self.columns[name][position].decode() for name in ("status", "reason"))
         return Outcome(status, reason, self.numbers([position])[0], self.attributes(position))
+
+    def outcomes(self, positions: np.ndarray) -> list[Outcome]:
+        """Return all that is stored of jobs."""
+        ends = (self.words(name)[positions].tolist() for name in ("status", "reason"))
+        found = zip(*ends, self.numbers(positions), positions, self.series(positions), strict=True)
+        return [
+            Outcome(status, reason, row, self.attributes(at), one)
+            for status, reason, row, at, one in found
+        ]
 
     def series(
         self, positions: Any, names: Sequence[str] | None = None

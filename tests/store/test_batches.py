@@ -9,7 +9,7 @@ from conftest import flip, write_batch
 from made_jobs import batches, forget, held, key, made, peaks, plan
 
 from compressor.store import batch, merge, reader
-from compressor.store.batch import read_batch, read_outcomes
+from compressor.store.batch import read_batch
 from compressor.store.files import StoreError
 from compressor.store.merge import merge_batches
 from compressor.store.reader import open_study, read_store
@@ -116,7 +116,7 @@ def test_of_equal_rows_the_later_counts_others_go_and_damaged_batches_are_set_as
     write_batch(tmp_path, [made(2, 11), made(2, 12)])
     write_batch(tmp_path, [made(3)]).write_bytes(b"torn")
     assert merge_batches(tmp_path) == {key(1), key(2)}
-    assert [len(read_outcomes(path)) for path in batches(tmp_path)] == [1, 2]
+    assert [len(read_batch(path)[0]["job"]) for path in batches(tmp_path)] == [1, 2]
     assert peaks(tmp_path) == {1: 11, 2: 12}
     (aside,) = (tmp_path / "batches").glob("*.damaged")
     assert aside.read_bytes() == b"torn"

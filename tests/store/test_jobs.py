@@ -9,7 +9,6 @@ from made_jobs import batches, key, made
 
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
-from compressor.store.batch import read_outcomes
 from compressor.store.files import StoreError
 from compressor.store.reader import read_job, read_store
 
@@ -69,8 +68,8 @@ def test_single_precision_saves_room(tmp_path):
 def test_jobs_of_any_length_kind_and_variables_share_a_batch(tmp_path):
     """Also single precision beside double."""
     jobs = [made(n, samples=n * 7 % 5, precision=("double", "single")[n % 2]) for n in range(8)]
-    path = write_batch(tmp_path, jobs)
-    for back, job in zip(read_outcomes(path), jobs, strict=True):
+    write_batch(tmp_path, jobs)
+    for back, job in zip(read_store(tmp_path).outcomes(np.arange(8)), jobs, strict=True):
         assert back.numbers.tobytes() == job.numbers.tobytes()
         assert back.attributes == job.attributes
         assert back.series.keys() == job.series.keys()

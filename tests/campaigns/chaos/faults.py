@@ -10,11 +10,13 @@ import random
 import re
 import shutil
 
+import numpy as np
 from stores_compared import differing
 
 from chaos import common
 from compressor.store import merge
-from compressor.store.batch import encode_batch, publish_batch, read_outcomes
+from compressor.store.batch import encode_batch, publish_batch
+from compressor.store.stored import read_store
 
 WHAT = "a disk that is full at any byte or file, or read-only"
 TMPFS = ("-t", "tmpfs")
@@ -54,15 +56,15 @@ def prepare(how, complete, store):
     if how == "nothing":
         return
     shutil.copytree(complete, store)
-    first, *others = sorted((store / "batches").iterdir())
+    first, *_ = sorted((store / "batches").iterdir())
     if how == "damaged":
         first.write_bytes(first.read_bytes()[:-1])
     elif how == "grown":  # and with many small batches, to be merged
         first.rename(leftover := first.with_name(f".{first.name}.{32 * '0'}.tmp"))
         os.utime(leftover, (0, 0))
-        for path in others:
-            for outcome in read_outcomes(path):
-                publish_batch(store, encode_batch([outcome]))
+        stored = read_store(store)
+        for outcome in stored.outcomes(np.arange(len(stored))):
+            publish_batch(store, encode_batch([outcome]))
 
 
 def say(words):
