@@ -15,8 +15,7 @@ from compressor.store.files import (
 )
 from compressor.store.merge import merge_batches
 from compressor.store.netcdf import DamagedFile, read_dataset, write_dataset
-from compressor.store.reader import label_studies, open_study, read_job
-from compressor.store.sensor_records import find_record, job_record
+from compressor.store.reader import find_record, job_record, label_studies, open_study, read_job
 from compressor.store.status import JobReport, list_orphans, report_job, standings, verify
 from compressor.store.stored import Stored, read_store
 from compressor.store.studies import (

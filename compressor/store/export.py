@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compressor.store.files import Folder, StoreWarning, WrongName, publish
-from compressor.store.sensor_records import job_record
+from compressor.store.reader import job_record
 from compressor.store.stored import Stored, read_store
 from compressor.store.studies import StoredStudy, find_study, read_studies, whole_key
 

@@ -1,15 +1,22 @@
-"""Stored jobs and studies as Datasets."""
+"""Stored jobs and studies as Datasets, and the records of their sensors."""
 
+import math
+import os
+import re
 import warnings
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-from compressor.store.files import Folder, StoreWarning
+import numpy as np
+
+from compressor.store.files import Folder, StoreError, StoreWarning, WrongName
 from compressor.store.stored import Stored, read_store
-from compressor.store.studies import StoredStudy, find_study, read_studies, whole_key
+from compressor.store.studies import StoredStudy, find_job, find_study, read_studies, whole_key
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from compressor.vibration import Record
 
 WHOLE_KEY = 20  # digits
 BOTH_JOINTS = (
@@ -90,3 +97,41 @@ def label_studies(stored: Stored, studies: Sequence[StoredStudy]) -> "xr.Dataset
     layout = datasets.lay_out(studies)
     found = datasets.label_jobs(layout, stored, with_series=True)
     return found.assign(datasets.machine_constants(studies, layout))
+
+
+NEEDS_SENSOR = "run it with body: true, sensor: true and output.keep: series"
+SERIES = ("sensor_time", "sensor_acceleration", "tacho_time")
+
+
+def job_record(stored: Stored, key: str) -> "Record | None":
+    """Return the sensor's record of a stored job; None where it has none."""
+    found = stored.values(key, SERIES)
+    if set(found) != set(SERIES):
+        return None
+    from compressor.vibration import Record  # loads parts of SciPy
+
+    times, values, tacho = (np.asarray(found[name], float) for name in SERIES)
+    return Record(times, values, tacho, math.nan)
+
+
+def find_record(name: str, folder: Folder, hints: Mapping[str, Any]) -> "tuple[str, Record]":
+    """Return a record by the name of its file, or by the beginning of a stored job's key.
+
+    With the job's key, "" of a file; hints: what a file does not say, by the names that
+    `compressor.vibration.read_record` has. Raises RecordError for a file, and StoreError for a job,
+    also where it is given hints.
+    """
+    if not re.fullmatch("[0-9a-f]{1,20}", name) or os.path.exists(name):
+        from compressor.vibration import read_record
+
+        return "", read_record(name, **hints)
+    if hints:
+        options = " ".join(f"--{hint.replace('_', '-')}" for hint in hints)
+        problem = f"a stored job such as {name} says all of its record"
+        raise WrongName(folder, problem, f"leave {options} out")
+    stored = read_store(folder, warn=True)
+    key = find_job(folder, [name], read_studies(folder), stored.keys())
+    record = job_record(stored, key)
+    if record is None:
+        raise StoreError(folder, f"job {key} has no sensor's record", NEEDS_SENSOR)
+    return key, record

@@ -37,8 +37,8 @@ from compressor.store.netcdf import DamagedFile
 if TYPE_CHECKING:
     import numpy as np
 
-DIGEST = b',\n "digest": '  # the last entry of a study, after all that it is made of
 RENAMED = {"joint": "fault"}  # `joint` is a dimension of every dataset
+DIGEST = b',\n "digest": '  # the last entry of a study, after all that it is made of
 UNIT_IN_GROUP = ("clearance_mm", "initial_offset_mm")
 
 
