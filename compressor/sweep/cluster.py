@@ -131,27 +131,22 @@ def run_on_cluster(
             if not out:
                 return
             future = next(ready)
-            batch, error = out.pop(future), future.exception()
-            found: Any = None
-            is_lost = future.cancelled() or client.status != "running"
-            if not error and not is_lost:
-                try:
-                    found = future.result()
-                except KilledWorker as late:  # it lay in a worker that died, and ran again
-                    error = late
-            if isinstance(error, KilledWorker) and not batch[0].again:
-                suspects += batch
+            batch = out.pop(future)
+            if future.cancelled() or client.status != "running":
+                raise lost_scheduler
+            try:
+                problem, ends, written = future.result()
+            except KilledWorker as death:
+                how = f"{death.allowed_failures + 1} workers of the cluster that had it alone"
+                if batch[0].again:
+                    yield End(batch[0].id, reason=Reason.WORKER_DIED, detail=f"it felled {how}")
+                else:
+                    suspects += batch
                 continue
-            if isinstance(error, KilledWorker):
-                how = f"{error.allowed_failures + 1} workers of the cluster that had it alone"
-                yield End(batch[0].id, reason=Reason.WORKER_DIED, detail=f"it felled {how}")
-                continue
-            if is_lost:
-                raise lost_scheduler from error
-            problem = f"no compsim, or an old one ({error})" if error else found[0]
+            except Exception as error:  # such as that it cannot be found there
+                problem = f"no compsim, or an old one ({error})"
             if problem:
-                raise ClusterError(f"a worker of the cluster has {problem}; {SAME}") from error
-            _, ends, written = found
+                raise ClusterError(f"a worker of the cluster has {problem}; {SAME}")
             for data in written:
                 publish_batch(folder, data)
             for job, end in zip(batch, ends, strict=True):

@@ -33,6 +33,7 @@ from compressor.reasons import Reason
 from compressor.store import StoreError
 from compressor.sweep.worker import NO_WORKER, End, Store, Workers, WorkersFailed
 
+cores = cpu_count  # that this process may use, by its affinity and its container's quota
 Input = tuple[Hashable, Any, float]  # id, payload, wall time that the job may take (s)
 
 TICK = 0.1  # s between two looks at a worker that is silent
@@ -57,7 +58,7 @@ class UnsupportedSystem(CompsimError):
 
 
 class Job(NamedTuple):
-    """A job that is not finished; one that is tried again runs alone, in a new process."""
+    """A job that is not finished; one that is tried again runs alone."""
 
     id: Any
     payload: Any
@@ -163,7 +164,7 @@ class Pool:
         Raises StoreError, and WorkersFailed.
         """
         try:
-            worker = self.take_worker(batch[0].again)
+            worker = self.take_worker()
             answer = worker.ask(batch, self.rules.grace)
         except Death as death:
             return [] if self.stopped else self.lose(batch, death)
@@ -175,21 +176,17 @@ class Pool:
             self.batches.waiting.appendleft(rest)
         return [self.settle(job, end) for job, end in zip(batch, answer, strict=False)]
 
-    def take_worker(self, anew: bool) -> "Worker":
+    def take_worker(self) -> "Worker":
         """Return a worker that is idle, or a new one. Raises Death, also when the pool is stopped.
 
         Raises WorkersFailed.
         """
-        with self.lock:
-            spare = self.idle.pop() if self.idle else None
-        if spare and not anew:
-            return spare
-        if spare:
-            spare.end()
         try:
             with self.lock:
                 if self.stopped:
                     raise Death("the pool's end")
+                if self.idle:
+                    return self.idle.pop()
                 if not self.loader or self.loader.process.poll() is not None:
                     self.loader = Loader(self.setup)
             return self.loader.start_worker()
@@ -347,11 +344,6 @@ def describe_ending(code: int) -> str:
     if code == -signal.SIGKILL:
         return "SIGKILL: out of memory, or killed from outside"
     return f"exit code {code}" if code >= 0 else signal.Signals(-code).name
-
-
-def cores() -> int:
-    """Return how many cores this process may use, by its affinity and its container's quota."""
-    return cpu_count()
 
 
 def memory_share(count: int) -> int:
