@@ -20,8 +20,7 @@ from compressor.program import COMPILED, VERSION, CompsimError, library_versions
 from compressor.reasons import Reason
 from compressor.store import encode_batch, publish_batch
 from compressor.sweep.pool import Batches, Job
-from compressor.sweep.sweep import Backend, run_job
-from compressor.sweep.wanted import JobEnd, RequestedJobs
+from compressor.sweep.sweep import Backend, JobEnd, RequestedJobs, run_job
 from compressor.sweep.warm_up import Part, load, needed_parts
 from compressor.sweep.worker import End, attempt, store_results
 

@@ -13,8 +13,7 @@ from typing import Any
 from compressor.cases import Case, Study, points
 from compressor.store import Folder, encode_batch, read_store
 from compressor.sweep.pool import cores
-from compressor.sweep.sweep import run_job
-from compressor.sweep.wanted import RequestedJobs
+from compressor.sweep.sweep import RequestedJobs, run_job
 from compressor.sweep.warm_up import compile_once, compile_seconds, load, needed_parts
 from compressor.sweep.worker import attempt
 

@@ -5,11 +5,11 @@ ended. A run that fails, breaks, or takes its worker with it, is a result with a
 """
 
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Container, Generator, Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from compressor.cases import Case, Study, points
 from compressor.outcome import Outcome, without_run
@@ -17,20 +17,106 @@ from compressor.program import Progress, ignore_warnings, no_progress
 from compressor.store import (
     Folder,
     FolderLost,
+    Stored,
     encode_batch,
     make_batches,
     merge_batches,
     publish_batch,
     read_store,
+    serving_both,
     write_study,
 )
 from compressor.sweep.pool import Input, Workers, cores, require_posix, run_batches
-from compressor.sweep.wanted import JobEnd, RequestedJobs
 from compressor.sweep.warm_up import Part, compile_once, load, needed_parts
 from compressor.sweep.worker import End, Store, attempt, store_results
 
 GRACE = 5.0  # s beyond its time in which a job may end by itself, before its worker is killed
 REPORT_SECONDS = 0.1  # s between two reports of progress, or more
+
+
+class JobEnd(NamedTuple):
+    """How a job ended."""
+
+    status: str
+    reason: str = ""
+    detail: str = ""
+
+    @classmethod
+    def of(cls, outcome: Outcome) -> "JobEnd":
+        return cls(outcome.status, outcome.reason, outcome.detail)
+
+
+class RequestedJobs:
+    """Jobs of studies, each once, by key; a case is built when it is used, since many take much.
+
+    Where studies share a job, its case serves them all. Iterating gives jobs as workers take them:
+    key, case and the time that it may take. `own`: cases that are shared, or were changed in what
+    is no part of their key.
+    """
+
+    def __init__(self, studies: Sequence[Study]):
+        self.places: dict[str, tuple[Study, int]] = {}
+        self.own: dict[str, Case] = {}
+        for study in studies:
+            for number in study.selected:
+                key = study.keys[number]
+                if key in self.places:
+                    self.own[key] = serving_both(self[key], study.cases[number])
+                else:
+                    self.places[key] = study, number
+
+    def among(self, keys: Container[str]) -> "RequestedJobs":
+        """Return those jobs with some keys."""
+        found = RequestedJobs(())
+        found.places = {key: place for key, place in self.places.items() if key in keys}
+        found.own = self.own
+        return found
+
+    def __getitem__(self, key: str) -> Case:
+        if key in self.own:
+            return self.own[key]
+        study, number = self.places[key]
+        return study.cases[number]
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def __iter__(self) -> Iterator[Input]:
+        return ((case.key, case, case.solve.timeout_s) for case in self.cases())
+
+    def cases(self) -> Iterator[Case]:
+        """Yield the cases of the jobs."""
+        return (self[key] for key in self.places)
+
+    def stored_ends(self, stored: Stored) -> dict[str, JobEnd]:
+        """Return how the jobs ended that need no new run: stored ones that serve, and are intact.
+
+        A case whose job is to be run again goes on keeping the time series that its job has, as
+        exact as they are.
+        """
+        found: dict[str, JobEnd] = {}
+        verdicts: dict[Hashable, bool] = {}  # by what a verdict depends on
+        studies = {study.name: study for study, _ in self.places.values()}
+        shared = {name for name, study in studies.items() if study.is_of_one_solver}
+        columns = (stored.columns[name].tolist() for name in ("status", "reason", "kept"))
+        ends = [*zip(*columns, strict=True)]
+        positions = stored.find([*self.places]).tolist()
+        for (key, (study, _)), position in zip(self.places.items(), positions, strict=True):
+            if position < 0:
+                continue
+            kind = study.name if study.name in shared and key not in self.own else key
+            about = kind, ends[position]
+            if about not in verdicts:
+                verdicts[about] = stored.status_at(position).satisfies(self[key])
+            if not (verdicts[about] and stored.intact(position)):
+                self.own[key] = stored.status_at(position).with_stored_outputs(self[key])
+            elif ends[position][0] == b"ok":
+                found[key] = JobEnd("ok")
+            else:
+                status, reason, _ = ends[position]
+                found[key] = JobEnd(status.decode(), reason.decode(), stored.detail(position))
+        return found
+
 
 # Where jobs run: runs cases, the payloads of jobs, stores their outcomes in a folder of results,
 # and yields how each job ended, with a JobEnd as its result; but lost ones are stored by the sweep.

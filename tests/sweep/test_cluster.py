@@ -21,8 +21,7 @@ from compressor.store.files import StoreError
 from compressor.store.status import verify
 from compressor.sweep import cluster
 from compressor.sweep.cluster import ClusterError, connect_cluster
-from compressor.sweep.sweep import Options, sweep
-from compressor.sweep.wanted import RequestedJobs
+from compressor.sweep.sweep import Options, RequestedJobs, sweep
 
 
 @pytest.fixture(scope="module")

@@ -18,8 +18,7 @@ from compressor.store import reader as store
 from compressor.store.batch import make_batches
 from compressor.store.files import FolderLost, StoreError
 from compressor.store.status import verify
-from compressor.sweep.sweep import sweep
-from compressor.sweep.wanted import RequestedJobs
+from compressor.sweep.sweep import RequestedJobs, sweep
 from compressor.sweep.worker import attempt
 
 SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
