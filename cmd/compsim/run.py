@@ -48,7 +48,7 @@ def run(command, configs, folder, jobs, rerun, shard, scheduler, quiet, **how) -
     if scheduler and jobs:
         raise click.UsageError("-j counts processes here; a dask cluster uses all its workers")
     from compressor.store import list_orphans
-    from compressor.sweep import Options, connect_cluster, cores, sweep
+    from compressor.sweep import connect_cluster, cores, sweep
 
     studies = read_cases(configs, quiet, **how)
     if how["only"] and not quiet:
@@ -58,9 +58,6 @@ def run(command, configs, folder, jobs, rerun, shard, scheduler, quiet, **how) -
     cluster: Any = connect_cluster(scheduler) if scheduler else nullcontext()
     opening = partial(screen.say_machines, machines)  # where there are jobs to run
     with ProgressReporter(quiet, "jobs", folder, opening) as progress, cluster as elsewhere:
-        asked = Options(
-            command, how["overrides"], bool(rerun), shard, elsewhere, progress.count_failed
-        )
         for name, keys in list_orphans(folder, studies).items():
             be = "is" if len(keys) == 1 else "are"
             show = shlex.join(["compsim", "show", keys[0], "-r", folder])
@@ -68,7 +65,11 @@ def run(command, configs, folder, jobs, rerun, shard, scheduler, quiet, **how) -
                 f"{name}: its study in {folder} is replaced, and {len(keys)} of its jobs {be} in "
                 f"no study now (such as: {show}); another name keeps both"
             )
-        summary = sweep(studies, folder, jobs or cores(), progress, asked)
+        studies = [study.shard(*shard) for study in studies] if shard else studies
+        summary = sweep(
+            studies, folder, jobs or cores(), progress, command, how["overrides"],
+            rerun_failed=bool(rerun), backend=elsewhere, failed=progress.count_failed,
+        )  # fmt: skip
     report_run(summary, folder, quiet)
     return screen.SOME_FAILED if summary.failed else screen.DONE
 

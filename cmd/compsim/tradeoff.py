@@ -34,13 +34,13 @@ def tradeoff(configs, folder, overrides, quiet) -> int:
         load_methods,
         work_precision,
     )
-    from compressor.sweep import Options, sweep
+    from compressor.sweep import sweep
 
     for config in configs:
         study, texts = load_methods(config, overrides, folder)
         with ProgressReporter(quiet, folder=folder) as progress:
             command = shlex.join(["compsim", "tradeoff", config, "-r", folder])
-            sweep([study], folder, 1, progress, Options(command, texts))  # jobs are timed
+            sweep([study], folder, 1, progress, command, texts)  # jobs are timed
         found = work_precision(folder, study)
         screen.print_text(*list_fastest(found))
         path = Path(folder, "tradeoff", study.name)

@@ -157,8 +157,9 @@ class GrowingStudy:
             few = sweep.in_this_process if len(new) < self.few else None
             # by its verb a report knows steps of a search from jobs of a sweep
             command = shlex.join(["compsim", self.ending.split("-")[1], self.path])
-            options = sweep.Options(command, texts, backend=few)
-            done = sweep.sweep([study], self.folder, self.workers, self.progress, options)
+            done = sweep.sweep(
+                [study], self.folder, self.workers, self.progress, command, texts, backend=few
+            )
             self.run_now += done.run_now
             self.jobs = dict(zip(every, study.keys, strict=True))
         return [self.jobs.get(point, "") for point in given]

@@ -156,8 +156,7 @@ def judge(
         if open_jobs:
             trials = [judge_case(job, judges_of(job)[number]) for job in open_jobs]
             study = study_of_judges(source, number + 1, open_jobs, trials)
-            options = sweep.Options(f"compsim judge {source.name}")
-            sweep.sweep([study], place, workers, progress, options)
+            sweep.sweep([study], place, workers, progress, f"compsim judge {source.name}")
             hear_votes(place, open_jobs, trials)
     return jobs
 

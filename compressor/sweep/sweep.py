@@ -125,24 +125,6 @@ Backend = Callable[[Path, RequestedJobs, Callable[[str], None]], Generator[End, 
 
 
 @dataclass(frozen=True)
-class Options:
-    """How to sweep.
-
-    command: what the store says that it was made by; overrides: KEY=VALUE that it set in the case
-    files; rerun_failed: failed jobs count as missing; part: (i, n) for shard i of n, of which other
-    processes may run the rest; backend: where jobs run, if not here; failed: called with the number
-    of failed jobs, before progress is.
-    """
-
-    command: str = ""
-    overrides: Sequence[str] = ()
-    rerun_failed: bool = False
-    part: tuple[int, int] | None = None
-    backend: Backend | None = None
-    failed: Callable[[int], object] = lambda count: None
-
-
-@dataclass(frozen=True)
 class JobFailure:
     """A failed job as one study sees it."""
 
@@ -169,31 +151,35 @@ def sweep(
     folder: Folder,
     workers: int = 2,
     progress: Progress = no_progress,
-    options: Options | None = None,
+    command: str = "",
+    overrides: Sequence[str] = (),
+    rerun_failed: bool = False,
+    backend: Backend | None = None,
+    failed: Callable[[int], object] = lambda count: None,
 ) -> Summary:
-    """Run what is missing of some studies and store it in a folder; failed jobs only on request.
+    """Run what is missing of some studies and store it in a folder.
 
-    workers: processes of this machine. Raises StoreError, and WorkersFailed; whatever ends a sweep
-    early, finished jobs are stored and the same call goes on. Raises UnsupportedSystem on Windows.
+    workers: processes of this machine; command: what the store says that it was made by; overrides:
+    KEY=VALUE that it set in the case files; rerun_failed: failed jobs count as missing; backend:
+    where jobs run, if not here; failed: called with the number of failed jobs, before progress is.
+    Raises StoreError, and WorkersFailed; whatever ends a sweep early, finished jobs are stored and
+    the same call goes on. Raises UnsupportedSystem on Windows.
     """
     require_posix()
-    options = options or Options()
     began = time.monotonic()
     folder = Path(folder).absolute()
-    if options.part is not None:
-        studies = [study.shard(*options.part) for study in studies]
     wanted, stored = RequestedJobs(studies), read_store(folder)
     ends = wanted.stored_ends(stored)
-    if options.rerun_failed:
+    if rerun_failed:
         ends = {key: end for key, end in ends.items() if end.status == "ok"}
     missing = wanted.among(wanted.places.keys() - ends.keys())
     make_batches(folder)
     for study in studies:
-        write_study(folder, study, options.command, options.overrides)
+        write_study(folder, study, command, overrides)
     if missing:
         for damage in stored.damaged:
             progress(len(ends), len(wanted), f"{damage}: its jobs count as missing")
-        run_missing(folder, missing, ends, workers, progress, options)
+        run_missing(folder, missing, ends, workers, progress, backend, failed)
     if missing or stored.damaged:
         held = merge_batches(folder)
         files = (folder / "studies" / f"{study.name}.json" for study in studies)
@@ -210,7 +196,8 @@ def run_missing(
     ends: dict[str, JobEnd],
     workers: int,
     progress: Progress,
-    options: Options,
+    backend: Backend | None,
+    tell_failed: Callable[[int], object],
 ) -> None:
     """Run and store jobs; `ends` gains how each ended. Progress counts those that are stored."""
     total = len(ends) + len(jobs)
@@ -220,12 +207,12 @@ def run_missing(
     def tell(text: str = "") -> None:
         nonlocal told
         told = time.monotonic()
-        options.failed(failed)
+        tell_failed(failed)
         progress(len(ends), total, text)
 
     tell()
-    if options.backend:
-        running = options.backend(folder, jobs, tell)
+    if backend:
+        running = backend(folder, jobs, tell)
     else:
         parts, store = needed_parts(jobs.cases()), partial(store_outcomes, folder)
         running = run_here(run_job, jobs, parts, workers, tell, store)

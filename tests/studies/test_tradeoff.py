@@ -18,7 +18,7 @@ from compressor.store.reader import read_job
 from compressor.studies.tradeoff import variants, work_precision
 from compressor.studies.tradeoff.changes import list_changes, model_table
 from compressor.studies.tradeoff.explain import advice_row, explain
-from compressor.sweep.sweep import Options, in_this_process, sweep
+from compressor.sweep.sweep import in_this_process, sweep
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0}
 THREE = ("contact stiffness × 2", "friction law: threlfall", "contact law: flores")
@@ -342,7 +342,7 @@ def made(place, *overrides, **values):
     values = {"joint": "big_end", "clearance_mm": 0.2, "solve": SHORT} | values
     (path,) = write_cases(place, worn=values)
     study, texts = work_precision.load_methods(str(path), overrides, place / "kept")
-    sweep([study], place / "kept", 1, no_progress, Options("", texts, backend=in_this_process))
+    sweep([study], place / "kept", 1, no_progress, "", texts, backend=in_this_process)
     return work_precision.work_precision(place / "kept", study), study, place / "kept"
 
 

@@ -21,7 +21,7 @@ from compressor.store.files import StoreError
 from compressor.store.status import verify
 from compressor.sweep import cluster
 from compressor.sweep.cluster import ClusterError, connect_cluster
-from compressor.sweep.sweep import Options, RequestedJobs, sweep
+from compressor.sweep.sweep import RequestedJobs, sweep
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_p
         connect_cluster(dask.scheduler_address) as backend,
         pytest.raises(StoreError, match="No space left on device"),
     ):
-        sweep(studies[1:], tmp_path / "out", options=Options(backend=backend))
+        sweep(studies[1:], tmp_path / "out", backend=backend)
 
 
 def test_workers_with_other_programs_are_refused(dask, studies, tmp_path, monkeypatch):
@@ -68,7 +68,7 @@ def test_workers_with_other_programs_are_refused(dask, studies, tmp_path, monkey
         connect_cluster(dask.scheduler_address) as backend,
         pytest.raises(ClusterError, match=there),
     ):
-        sweep(studies[1:], tmp_path / "out", options=Options(backend=backend))
+        sweep(studies[1:], tmp_path / "out", backend=backend)
 
 
 def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path, monkeypatch):
@@ -84,7 +84,7 @@ def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path,
                 empty.close()
 
         with pytest.raises(ClusterError, match="the scheduler was lost; the same command goes on"):
-            sweep(studies, tmp_path / "out", progress=remark, options=Options(backend=backend))
+            sweep(studies, tmp_path / "out", progress=remark, backend=backend)
     assert told.count(cluster.WAITING) == 1
 
 
@@ -143,7 +143,7 @@ def test_a_job_that_fells_its_worker_is_lost_alone(dask, studies, tmp_path, monk
     monkeypatch.setattr(cluster, "run_job", bad_jobs.harmful)
     monkeypatch.setattr(cluster, "run_cases", bad_jobs.run_harmful_cases)
     with connect_cluster(dask.scheduler_address) as backend:
-        summary = sweep(studies, tmp_path / "out", options=Options(backend=backend))
+        summary = sweep(studies, tmp_path / "out", backend=backend)
     assert summary.run_now == 36
     (lost,) = summary.failed
     assert lost.coordinates["clearance_mm"] == pytest.approx(0.2)

@@ -59,7 +59,7 @@ def load_methods(
     settings = [f"name={own.name[: frame.MAX_NAME - len(ENDING)]}{ENDING}", *SETTINGS]
     given = [case.solve.duration_rev for case in own.cases]
     if "auto" in [*given, *(case.solve.settle_rev for case in own.cases)]:
-        sweep.sweep([own], folder, 1, options=sweep.Options(overrides=of_file))
+        sweep.sweep([own], folder, 1, overrides=of_file)
         runs = [(case, store.read_job(folder, case.key)) for case in own.cases]
         settle = max(round(run.attrs.get("settle", 0.0) / case.turn, 6) for case, run in runs)
         duration = max(settle + SETTLED_REV, *(one for one in given if isinstance(one, float)), 0.0)
