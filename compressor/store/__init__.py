@@ -2,7 +2,6 @@
 
 from compressor.store.batch import encode_batch, make_batches, publish_batch
 from compressor.store.caveats import CLIPPED, run_caveats, study_caveats
-from compressor.store.demands import serving_both
 from compressor.store.export import export
 from compressor.store.files import (
     Folder,
@@ -17,7 +16,7 @@ from compressor.store.merge import merge_batches
 from compressor.store.netcdf import DamagedFile, read_dataset, write_dataset
 from compressor.store.reader import find_record, job_record, label_studies, open_study, read_job
 from compressor.store.status import JobReport, list_orphans, report_job, standings, verify
-from compressor.store.stored import Stored, read_store
+from compressor.store.stored import Stored, read_store, serving_both
 from compressor.store.studies import (
     Again,
     StoredStudy,
