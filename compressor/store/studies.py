@@ -18,7 +18,9 @@ import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from compressor.cases import MODEL_VERSION, Axis, Study, phrase_of, points, row_of, values_given
 from compressor.digits import setting
@@ -33,9 +35,6 @@ from compressor.store.files import (
     system_error,
 )
 from compressor.store.netcdf import DamagedFile
-
-if TYPE_CHECKING:
-    import numpy as np
 
 RENAMED = {"joint": "fault"}  # `joint` is a dimension of every dataset
 DIGEST = b',\n "digest": '  # the last entry of a study, after all that it is made of
@@ -88,13 +87,11 @@ class Again(NamedTuple):
     jobs: int
 
 
-def swept_column(key: str, values: Sequence[Any]) -> tuple["np.ndarray", dict[str, str]]:
+def swept_column(key: str, values: Sequence[Any]) -> tuple[np.ndarray, dict[str, str]]:
     """Return the values of a swept key as a coordinate, (jobs,), and its attributes.
 
     Numbers, nan where a job has none, have a unit; others are words, "" where there is none.
     """
-    import numpy as np  # status does without
-
     attrs, row = {"long_name": phrase_of(key), "case_key": key}, row_of(key)
     unit = (row.unit or "1") if row and row.is_number else ""
     if unit and not any(isinstance(value, str) for value in values):
