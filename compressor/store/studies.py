@@ -125,23 +125,17 @@ def write_study(
 
     Raises StoreError where the disk refuses.
     """
+    same = ("name", "axes", "keys", "is_grid", "title", "notes", "figures", "is_curve")
     new = StoredStudy(
-        study.name,
-        os.path.abspath(study.path),
-        study.axes,
-        study.keys,
-        study.cases[0].values(),
-        command,
-        {"compsim": VERSION, "model": MODEL_VERSION}
+        **{name: getattr(study, name) for name in same},
+        case_file=os.path.abspath(study.path),
+        fixed=study.cases[0].values(),
+        command=command,
+        versions={"compsim": VERSION, "model": MODEL_VERSION}
         | library_versions("numpy", "scipy", "numba", "h5py", "xarray"),
-        datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        study.is_grid,
-        study.title,
-        study.notes,
-        tuple(dict.fromkeys(key for block in study.fixed for key in values_given(block))),
-        tuple(overrides),
-        study.figures,
-        study.is_curve,
+        written=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        given=tuple(dict.fromkeys(key for block in study.fixed for key in values_given(block))),
+        overrides=tuple(overrides),
     )
     path = Path(folder) / "studies" / f"{study.name}.json"
     with contextlib.suppress(StoreError, FileNotFoundError):  # one that is damaged is replaced
