@@ -20,7 +20,7 @@ import numpy as np
 from compressor.store.files import Folder, StoreWarning, WrongName, publish
 from compressor.store.reader import job_record
 from compressor.store.stored import Stored, read_store
-from compressor.store.studies import StoredStudy, find_study, read_studies, whole_key
+from compressor.store.studies import find_study, read_studies, whole_key
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,8 +37,13 @@ def export(
     .csv. force: replace what is there. Raises WrongName for a file that does not fit, and
     StoreError where the store or the disk gives way.
     """
+    from compressor.store import dataset as datasets  # loads xarray: half a second
+
     path, stored, known = Path(output), read_store(folder, warn=True), read_studies(folder)
-    _check_target(path, force)
+    if path.suffix != ".csv":
+        raise WrongName(path, "is no name of a CSV file", "end it in .csv")
+    if os.path.lexists(path) and not force:
+        raise WrongName(path, "exists", "--force replaces it")
     keys = {name for name in names if HEXADECIMAL.fullmatch(name)} - {one.name for one in known}
     if keys and len(names) > 1:
         problem = "has studies, or one job"
@@ -49,36 +54,19 @@ def export(
     else:
         studies = [find_study(folder, name, known) for name in dict.fromkeys(names)] or known
         rows, what = sum(study.jobs for study in studies), "job"
-        data = _encode_studies(stored, studies)
+        table = datasets.label_jobs(datasets.lay_out_jobs(studies), stored)
+        data = encode_csv(columns(table, "job"))
     publish(path, data)
     return rows, what
 
 
-def _check_target(path: Path, force: bool) -> None:
-    """Raise WrongName where a file may not be written."""
-    if path.suffix != ".csv":
-        raise WrongName(path, "is no name of a CSV file", "end it in .csv")
-    if os.path.lexists(path) and not force:
-        raise WrongName(path, "exists", "--force replaces it")
-
-
-def _encode_studies(stored: Stored, studies: Sequence[StoredStudy]) -> bytes:
-    """Return the numbers of studies' jobs as one table."""
-    from compressor.store import dataset as datasets  # loads xarray: half a second
-
-    table = datasets.label_jobs(datasets.lay_out_jobs(studies), stored)
-    return encode_csv(columns(table, "job"))
-
-
 def _encode_job(stored: Stored, key: str) -> tuple[int, bytes]:
     """Return how many rows a job's file has, and its bytes."""
-    position = stored.position(key)
-    if position is None:
-        raise WrongName(stored.folder, f"job {key} is not stored", "run its case file first")
-    if not (samples := int(stored.columns["samples"][position])):
+    run = stored.job(key)
+    if "time" not in run.dims:
         remedy = "run its case file with --set output.keep=series, or export its study"
         raise WrongName(stored.folder, f"job {key} has no time series", remedy)
-    table = columns(stored.job(key), "time")
+    table = columns(run, "time")
     if found := job_record(stored, key):
         from compressor.vibration import record_columns  # loads parts of SciPy
 
@@ -87,7 +75,7 @@ def _encode_job(stored: Stored, key: str) -> tuple[int, bytes]:
             problem = "no column tacho: its sensor's record passes top dead centre less than twice"
             remedy = "raise solve.duration_rev or sensor.length_rev"
             warnings.warn(f"job {key}: {problem}; {remedy}", StoreWarning, stacklevel=3)
-    return samples, encode_csv(table)
+    return run.sizes["time"], encode_csv(table)
 
 
 def columns(table: "xr.Dataset", dim: str) -> dict[str, np.ndarray]:

@@ -34,7 +34,7 @@ from compressor.store.batch import (
     read_numbers,
     read_series,
 )
-from compressor.store.files import Folder, StoreError, StoreWarning, system_error
+from compressor.store.files import Folder, StoreError, StoreWarning, WrongName, system_error
 from compressor.store.netcdf import DamagedFile, check_file
 
 if TYPE_CHECKING:
@@ -340,7 +340,7 @@ class Stored:
 
         position = self.position(key)
         if position is None:
-            raise StoreError(self.folder, f"job {key} is not stored", "run its study first")
+            raise WrongName(self.folder, f"job {key} is not stored", "run its study first")
         outcome = self.outcome(position)
         return xr.Dataset(outcome.table(self.series([position])[0]), attrs=outcome.attributes)
 
