@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from compressor.cases import Case, CaseError, PerJoint
+from compressor.cases import Case, CaseError
 from compressor.metrics import ALWAYS, NUMBERS
 from compressor.outcome import ROW, Outcome, Variable
 from compressor.reasons import Reason
@@ -39,8 +39,6 @@ from compressor.store.netcdf import DamagedFile, check_file
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from compressor.store.studies import StoredStudy
 
 ATTEMPTS = 100  # at reading batches that a run merges meanwhile
 Found = TypeVar("Found")
@@ -207,23 +205,6 @@ class Stored:
     def detail(self, position: int) -> str:
         """Return what is known of a failure beyond its reason."""
         return str(self.attributes(position).get("detail", ""))
-
-    def find_ok(self, key: str, study: "StoredStudy") -> tuple[Case, Outcome] | str:
-        """Return the case and outcome of a study's job that is ok, else in a word why not.
-
-        A joint of the case counts as sound by the study: another may have stored the job.
-        """
-        position = self.position(key)
-        if position is None:
-            return "missing"
-        outcome = self.outcome(position)
-        if outcome.status != "ok":
-            return outcome.reason
-        case = self.case_at(position)
-        if case is None:
-            return "damaged"
-        healthy = study.fixed.get("healthy_clearance_mm", {"big_end": 0.0, "small_end": 0.0})
-        return replace(case, healthy_clearance_mm=PerJoint(**healthy)), outcome
 
     # ---- what is read of their batches ----------------------------------------------------------
 

@@ -14,7 +14,7 @@ import shlex
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -205,19 +205,25 @@ def records(
     """
     stored = store.read_store(folder, warn=True)
     own = dict(zip(source.keys, cases.points(source), strict=True))
+    healthy = source.fixed.get("healthy_clearance_mm", {"big_end": 0.0, "small_end": 0.0})
     for key, point in program.report_progress([*own.items()], progress):
-        try:
-            found = stored.find_ok(key, source)
-            record = None if isinstance(found, str) else store.job_record(stored, key)
-        except store.DamagedFile:
-            left["damaged"] += 1
+        if (position := stored.position(key)) is None:
+            left["missing"] += 1
             continue
-        if isinstance(found, str):
-            left[found] += 1
+        try:
+            outcome, case = stored.outcome(position), stored.case_at(position)
+            record = store.job_record(stored, key)
+        except store.DamagedFile:
+            case = None
+        if case is None:
+            left["damaged"] += 1
+        elif outcome.reason:
+            left[outcome.reason] += 1
         elif record is None:
             left["without_record"] += 1
         else:
-            yield RecordedJob(key, point, *found, record)
+            case = replace(case, healthy_clearance_mm=cases.PerJoint(**healthy))
+            yield RecordedJob(key, point, case, outcome, record)
 
 
 def no_records(source: StoredStudy, left: Mapping[str, int], revolutions: int) -> StudyError:
