@@ -17,13 +17,11 @@ how they are told apart in samples:
 - following: the rest. The force may vanish within it, as long as the journal stays pressed in.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.polynomial import Polynomial
 
 from compressor.analysis.runs import record_of
 from compressor.metrics import JOINTS
@@ -42,25 +40,11 @@ class ContactSeries:
     """
 
     joint: str
-    clearance: float
     time: np.ndarray
     angle: np.ndarray
     place: np.ndarray
     depth: np.ndarray
     normal: np.ndarray
-
-
-@dataclass(frozen=True)
-class ContactSpan:
-    """A contact: the samples `first` to `last`, and `gap` of them without contact before it.
-
-    `after_flight`: the journal was off its bore within that gap, as `impact_count` has it.
-    """
-
-    first: int
-    last: int
-    gap: int
-    after_flight: bool
 
 
 def joints_with_clearance(run: "xr.Dataset") -> dict[str, float]:
@@ -93,7 +77,6 @@ def contact_series(run: "xr.Dataset", joint: str) -> ContactSeries:
     normal[depth[valid] < 0] = 0.0  # what acts across a gap is a film of oil
     return ContactSeries(
         joint,
-        float(record_of(run)["clearance"][JOINTS.index(joint)]),
         run["time"].values[valid],
         run["crank_angle"].values[valid],
         place,
@@ -102,34 +85,25 @@ def contact_series(run: "xr.Dataset", joint: str) -> ContactSeries:
     )
 
 
-def contact_spans(series: ContactSeries) -> list[ContactSpan]:
-    """Return the contacts of a joint in order of time; one between two samples is not seen."""
-    touching = series.normal > 0
-    edges = np.flatnonzero(np.diff(touching, prepend=False, append=False)).reshape(-1, 2)
-    found, before = [], 0
-    for first, beyond in edges.tolist():
-        flown = bool((series.depth[before:first] < 0).any())
-        found.append(ContactSpan(first, beyond - 1, first - before, flown))
-        before = beyond
-    return found
+def flights(series: ContactSeries) -> list[tuple[int, int]]:
+    """Return the first sample of each flight, and the one behind its last.
 
-
-STENCIL = 4  # samples that the journal's path before first touch is a polynomial through
+    A flight has no contact and is off the bore at some time. A contact that is lost and found again
+    within the penetration leaves no flight; one between two samples is not seen.
+    """
+    edges = np.flatnonzero(np.diff(series.normal <= 0, prepend=False, append=False)).reshape(-1, 2)
+    return [(a, b) for a, b in edges.tolist() if (series.depth[a:b] < 0).any()]
 
 
 @dataclass(frozen=True)
 class Impact:
-    """One impact with its contact; SI but for the angle.
-
-    `follows`: the first sample that is following contact; after `span.last` where there is none.
-    """
+    """One impact; its first sample, and the first that is following contact."""
 
     joint: str
-    time: float  # of first touch
+    time: float  # of first touch, s
     crank_angle: float  # of first touch, degrees from top dead centre, 0 to 360
     revolution: int  # of first touch, the run's first being 1
-    approach_speed: float  # relative normal speed at first touch
-    span: ContactSpan
+    first: int
     follows: int
 
 
@@ -151,79 +125,49 @@ def impacts_of(run: "xr.Dataset", series: ContactSeries) -> list[Impact]:
     contact = elastic_form(float(p["stiffness"][number]), float(p["clearance"][number]), p)
     mass = float(p["rod_mass"] + p["reciprocating_mass"])
     found = []
-    for span in contact_spans(series):
-        if not span.after_flight:
+    for begin, first in flights(series):
+        if first == series.time.size:  # no contact follows
             continue
-        begin, speed = touch(series, span)
+        last = begin + int(np.flatnonzero(series.depth[begin:first] < 0)[-1])  # off its bore
+        near = slice(max(0, last - 1), last + 2)
+        rates = np.diff(series.depth[near]) / np.diff(series.time[near])
+        time = float(np.interp(0.0, series.depth[near][-2:], series.time[near][-2:]))
+        speed = max(0.0, float(rates.max()))
         longest = contact.impact_time(contact.impact_depth(mass, speed), speed)
-        turns = np.interp(begin, series.time, series.angle) / (2 * np.pi)
+        turns = np.interp(time, series.time, series.angle) / (2 * np.pi)
+        follows = following_from(series, first, time + longest)
         found.append(
-            Impact(
-                series.joint, begin, float(360.0 * (turns % 1.0)), int(turns) + 1, speed, span,
-                following_from(series, span, begin + longest),
-            )
-        )  # fmt: skip
+            Impact(series.joint, time, float(360 * (turns % 1)), int(turns) + 1, first, follows)
+        )
     return found
 
 
-def touch(series: ContactSeries, span: ContactSpan) -> tuple[float, float]:
-    """Return the time (s) and approach speed (m/s) of a contact's first touch.
-
-    Without contact the eccentricity is smooth, so that it is taken as the polynomial through the
-    last `STENCIL` samples without contact; of shorter flights through those and the first one in
-    contact. First touch is where its length reaches the clearance. The error of the speed falls
-    with the cube of the sample step.
-    """
-    from scipy.optimize import brentq  # takes 0.2 s, of commands that need no impacts too
-
-    first = span.first
-    chosen = np.arange(first - min(STENCIL, span.gap), first + (span.gap < STENCIL))
-    step = series.time[first] - series.time[first - 1]
-    s = (series.time[chosen] - series.time[first]) / step
-    x, y = (Polynomial.fit(s, values, s.size - 1) for values in series.place[chosen].T)
-
-    def gap(at: float) -> float:
-        return math.hypot(x(at), y(at)) - series.clearance
-
-    at = -1.0 if gap(-1.0) >= 0 else 0.0
-    if gap(-1.0) < 0 < gap(0.0):
-        at = float(brentq(gap, -1.0, 0.0))
-    rate = x(at) * x.deriv()(at) + y(at) * y.deriv()(at)
-    speed = float(rate / math.hypot(x(at), y(at)) / step)
-    return float(series.time[first] + at * step), max(0.0, speed)
-
-
-def following_from(series: ContactSeries, span: ContactSpan, until: float) -> int:
-    """Return the first sample of a contact that is no longer impact.
+def following_from(series: ContactSeries, first: int, until: float) -> int:
+    """Return the first sample of a contact, by its first one, that is no longer impact.
 
     An impact is one compression and one restitution. It ends where the penetration has passed a
     maximum and then a minimum, and at the latest at `until`, s.
     """
-    depth = series.depth[span.first : span.last + 1]
-    falling = np.flatnonzero(np.diff(depth) < 0)
-    beyond = span.last + 1
+    released = np.flatnonzero(series.normal[first:] <= 0)
+    beyond = first + int(released[0]) if released.size else series.time.size
     late = int(np.searchsorted(series.time[:beyond], until, side="right"))
+    depth = series.depth[first:beyond]
+    falling = np.flatnonzero(np.diff(depth) < 0)
     if falling.size:
         rising = np.flatnonzero(np.diff(depth[falling[0] :]) > 0)
         if rising.size:
-            beyond = span.first + int(falling[0] + rising[0])
-    return max(span.first + 1, min(beyond, late))
+            beyond = first + int(falling[0] + rising[0])
+    return max(first + 1, min(beyond, late))
 
 
 FLIGHT, IMPACT, FOLLOWING = range(3)  # contact modes
 
 
 def modes_of(series: ContactSeries, struck: Sequence[Impact]) -> np.ndarray:
-    """Return the mode of a joint at each sample, (m,) numbers; struck: its impacts.
-
-    A flight has no contact and is off the bore at some time. A contact that is lost and found again
-    within the penetration leaves no flight.
-    """
+    """Return the mode of a joint at each sample, (m,) numbers; struck: its impacts."""
     modes = np.full(series.time.size, FOLLOWING, np.int8)
-    edges = np.flatnonzero(np.diff(series.normal <= 0, prepend=False, append=False)).reshape(-1, 2)
-    for begin, beyond in edges.tolist():
-        if (series.depth[begin:beyond] < 0).any():
-            modes[begin:beyond] = FLIGHT
+    for begin, beyond in flights(series):
+        modes[begin:beyond] = FLIGHT
     for one in struck:
-        modes[one.span.first : one.follows] = IMPACT
+        modes[one.first : one.follows] = IMPACT
     return modes
