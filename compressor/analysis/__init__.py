@@ -1,6 +1,6 @@
 """What runs mean, and what the paper says of them."""
 
-from compressor.analysis.cam import Cam
+from compressor.analysis.cam import BASE_RADIUS, Cam
 from compressor.analysis.cautions import cautions
 from compressor.analysis.claims import RULES, Claim, claim_margins, claims
 from compressor.analysis.contacts import impacts, joints_with_clearance

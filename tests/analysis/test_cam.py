@@ -19,7 +19,7 @@ def test_a_cam_of_any_stroke_closes(stroke_mm, lift):
     profile = cam.follower(ANGLES)
     assert profile[[0, -2]] == pytest.approx(0.0, abs=1e-4)
     assert profile.max() == pytest.approx(lift)
-    radius = np.hypot(*cam.contour(ANGLES, 0.2))
+    radius = np.hypot(*cam.contour(ANGLES))
     assert (radius.min(), radius.max()) == pytest.approx((0.2, 0.2 + lift))
     assert np.abs(np.diff(profile)).max() < 2e-4
     _, bottom, fall = cam.p.corners

@@ -196,7 +196,7 @@ def test_a_chaotic_share_has_the_scatter_of_its_revolutions(paper_runs):
     run = paper_runs["big_end 0.2"].copy(deep=True)
     turn = np.floor(run["crank_angle"].values / (2.0 * np.pi) + 1e-9)
     flies = (np.degrees(run["crank_angle"].values) % 360) < 90.0 * turn
-    run["penetration"].loc[{"joint": "big_end"}] = np.where(flies, -1e-6, 1e-6)
+    run["penetration"].loc[{"joint": "big_end"}] = np.where(flies, -1e-4, 1e-4)
     run["contact_force"].loc[{"joint": "big_end"}] = np.where(flies, 0.0, 1.0)[:, None]
     run.attrs["regime"] = "chaotic"
     found = margins.share_apart(run, "big_end")

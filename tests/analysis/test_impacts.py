@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bouncing import CONTACT, FLIGHT, SPEED, bounce, pressed, run_of, times
+from bouncing import CONTACT, FLIGHT, bounce, pressed, run_of, times
 
 from compressor.analysis import impacts, settled_part
 from compressor.analysis.contacts import FOLLOWING, contact_series, impacts_of, modes_of
@@ -16,7 +16,7 @@ def column(found, name):
     return np.array([getattr(one, name) for one in found])
 
 
-@pytest.mark.parametrize(("step", "error"), [(0.3, 5e-5), (0.03, 2e-7)])
+@pytest.mark.parametrize(("step", "error"), [(0.3, 5e-7), (0.03, 5e-9)])
 def test_known_bounces(step, error):
     """Times are multiples of a bounce's period, at odds with the sampling; the first begins at 0
     and follows no flight; the last is cut off."""
@@ -25,10 +25,9 @@ def test_known_bounces(step, error):
     begins = np.arange(1, time[-1] // (CONTACT + FLIGHT) + 1) * (CONTACT + FLIGHT)
     assert len(found) == begins.size
     assert {one.joint for one in found} == {"big_end"}
-    np.testing.assert_allclose(column(found, "time"), begins, atol=2e-9 if step == 0.3 else 2e-12)
-    np.testing.assert_allclose(column(found, "crank_angle"), begins * 3000.0 % 360.0, atol=1e-5)
+    np.testing.assert_allclose(column(found, "time"), begins, atol=error)
+    np.testing.assert_allclose(column(found, "crank_angle"), begins * 3000.0 % 360.0, atol=3000 * error)
     assert column(found, "revolution").tolist() == (begins // 0.12 + 1).tolist()
-    np.testing.assert_allclose(column(found, "approach_speed"), SPEED, rtol=error)
 
 
 def test_a_release_while_pressed_in_is_no_impact():
@@ -53,7 +52,6 @@ def test_impacts_are_as_many_as_the_run_counted(joint, speed):
     counts = [sum(one.joint == name for one in found) for name in run["joint"].values]
     assert counts == run["impact_count"].values.astype(int).tolist()
     assert sum(counts) >= 3
-    assert all(one.approach_speed > 0 for one in found)
     # contact that is lost is flight, but for what is released while pressed in
     lost = run["contact_loss_fraction"].values
     assert lost.max() > 0.01

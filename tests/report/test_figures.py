@@ -150,7 +150,7 @@ def test_cam(drawn):
     turn = np.radians(np.linspace(0, 360, 1441))
     path, circle = lines(contour)
     assert np.hypot(*circle) == pytest.approx(200)
-    np.testing.assert_allclose(path, np.multiply(cam.contour(turn, 0.2), 1000), atol=1e-9)
+    np.testing.assert_allclose(path, np.multiply(cam.contour(turn), 1000), atol=1e-9)
     assert contour.y.scaleanchor == "x"
     (printed,) = (one for one in follower.traces if one.name == "as printed, Eq. 10")
     (closed,) = (one for one in follower.traces if one.name == "closed cam, as simulated")

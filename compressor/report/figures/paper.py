@@ -283,7 +283,7 @@ def draw_pressure_volume(runs: curves.Runs, units: Units = "usual") -> DrawnFigu
     )
     numbers, used = [], analysis.record_of(run).corners
     if used.any():
-        off = np.abs(used - analysis.Cam.of(run).gas_corners).max()
+        off = np.abs(used - analysis.Cam(analysis.record_of(run)).gas_corners).max()
         numbers = [
             ("the phases change at", spell_angles(used)),
             ("off the ideal gas's corners by up to", spell_angles(off)),
@@ -294,7 +294,7 @@ def draw_pressure_volume(runs: curves.Runs, units: Units = "usual") -> DrawnFigu
 @paper_figure(4, "The cam of the spring load", "design")
 def draw_cam(runs: curves.Runs, units: Units = "usual") -> DrawnFigure:
     """Return figure 4: the cam's contour, and its follower's displacement, also as printed."""
-    cam = analysis.Cam.of(runs["design"])
+    cam = analysis.Cam(analysis.record_of(runs["design"]))
     angles = np.radians(np.linspace(0, 360, 1441))
     drawing, panels = make_grid(1, 2, 4.9, widths=(1, 1.25), units=units)
     draw_contour(panels[0, 0], cam, angles)
@@ -304,10 +304,10 @@ def draw_cam(runs: curves.Runs, units: Units = "usual") -> DrawnFigure:
         "expand or be compressed. (b) The follower's displacement: of the closed cam, our "
         "reconstruction, and of Eq. 10 as printed, with the ideal gas's corners."
     )
-    rise, fall = cam.printed_heights
+    rise, fall = cam.printed_follower([math.pi, cam.gas_corners[2]])
     numbers = [
         ("as printed it rises and falls by", spell([1e3 * rise, 1e3 * fall], "mm", units)),
-        ("the closed cam, each way, by", spell(1e3 * cam.height, "mm", units)),
+        ("the closed cam, each way, by", spell(1e3 * cam.follower(math.pi), "mm", units)),
         ("both are the same from", spell_angles(cam.gas_corners[2])),
     ]
     return DrawnFigure(drawing.figure(), sentence, numbers)
@@ -315,13 +315,13 @@ def draw_cam(runs: curves.Runs, units: Units = "usual") -> DrawnFigure:
 
 def draw_contour(panel: Panel, cam: analysis.Cam, angles: np.ndarray) -> None:
     """Draw the closed cam's pitch curve around its base circle."""
-    x, y = cam.contour(angles, cam.base_radius)
+    x, y = cam.contour(angles)
     panel.title = "(a) contour of the closed cam"
     panel.scale_alike()
     panel.label("x", "x ({})", "mm")
     panel.label("y", "y ({})", "mm")
-    rim = cam.base_radius * 1e3 * np.array([np.cos(angles), np.sin(angles)])
-    panel.plot(rim[0], rim[1], BASE, f"base circle, {cam.base_radius * 1e3:g} mm")
+    rim = analysis.BASE_RADIUS * 1e3 * np.array([np.cos(angles), np.sin(angles)])
+    panel.plot(rim[0], rim[1], BASE, f"base circle, {analysis.BASE_RADIUS * 1e3:g} mm")
     panel.plot(x * 1e3, y * 1e3, CLOSED, "roller's path")
     for way, values in zip(WAYS, (x, y), strict=True):
         room = 0.06 * np.ptp(values)
@@ -339,7 +339,7 @@ def draw_follower(panel: Panel, cam: analysis.Cam, angles: np.ndarray) -> None:
     panel.plot(np.degrees(parts), s, PRINTED, "as printed, Eq. 10")
     s = cam.follower(angles) * 1e3
     panel.plot(np.degrees(angles), s, CLOSED, "closed cam, as simulated")
-    height, left = (float(cam.printed_follower(turn)) * 1e3 for turn in (math.pi, fall))
+    height, left = 1e3 * cam.printed_follower([math.pi, fall])
     dots = style.LineStyle(style.RED, (1, 1.65), 1.5)
     panel.plot(np.degrees([fall, fall]), [left, height], dots)
     panel.title, panel.x.dtick = "(b) follower displacement", 60.0
