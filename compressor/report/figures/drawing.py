@@ -39,55 +39,31 @@ class Panel:
     """One of a figure's axes, to fill and to read; suffix: of its axes in plotly, such as "2".
 
     What is drawn is in the units that `label` is given, and becomes multiples of those in which the
-    axes are read.
+    axes are read. `traces`, and plotly's annotations `notes` and shapes `rules`, but for `title`.
     """
 
     def __init__(self, figure: go.Figure, suffix: str, units: Units = "usual"):
         self.figure, self.suffix, self.units = figure, suffix, units
         self.x, self.y = (figure.layout[f"{way}axis{suffix}"] for way in WAYS)
         self.factors = dict.fromkeys(WAYS, 1.0)
+        self.title = ""
+        self.traces: list[Trace] = []
+        self.notes: list[Any] = []
+        self.rules: list[Any] = []
 
     def axis(self, way: Way) -> Axis:
         """Return the axis `x` or `y`, of plotly."""
         return self.x if way == "x" else self.y
 
     @property
-    def traces(self) -> list[Trace]:
-        """Return what is drawn from the lowest to the highest, bars first."""
-        mine = (one for one in self.figure.data if one.xaxis == f"x{self.suffix}")
-        return sorted(mine, key=lambda one: (one.type != "bar", one.zorder))
-
-    @property
-    def notes(self) -> list[Any]:
-        """Return plotly's annotations of the panel, but for its title."""
-        return [one for one in self.marks_of("annotations") if one.name != "title"]
-
-    @property
-    def rules(self) -> list[Any]:
-        """Return plotly's shapes of the panel."""
-        return self.marks_of("shapes")
-
-    def marks_of(self, kind: str) -> list[Any]:
-        """Return the `annotations` or `shapes` of the panel."""
-        name = f"x{self.suffix}"
-        return [one for one in self.figure.layout[kind] if one.xref.partition(" ")[0] == name]
-
-    @property
-    def title(self) -> str:
-        """Return the text above the panel."""
-        return next((one.text for one in self.marks_of("annotations") if one.name == "title"), "")
-
-    @title.setter
-    def title(self, text: str) -> None:
-        for note in self.marks_of("annotations"):
-            if note.name == "title":
-                note.text = text
-                return
-        self.figure.add_annotation(
-            text=text, name="title", x=0.0, xref=f"x{self.suffix} domain", xanchor="left", y=1.0,
-            yref=f"y{self.suffix} domain", yanchor="bottom", yshift=3.0 * PIXEL, showarrow=False,
-            align="left", font={"color": BLACK, "size": 10.0 * PIXEL},
-        )  # fmt: skip
+    def heading(self) -> dict[str, Any]:
+        """Return plotly's description of the title."""
+        return {
+            "text": self.title, "name": "title", "x": 0.0, "xref": f"x{self.suffix} domain",
+            "xanchor": "left", "y": 1.0, "yref": f"y{self.suffix} domain", "yanchor": "bottom",
+            "yshift": 3.0 * PIXEL, "showarrow": False, "align": "left",
+            "font": {"color": BLACK, "size": 10.0 * PIXEL},
+        }  # fmt: skip
 
     def label(self, way: Way, title: str, unit: str = "") -> None:
         """Name an axis before anything is drawn; `{}` in the title stands for the unit."""
@@ -109,6 +85,7 @@ class Panel:
         made.update(xaxis=f"x{self.suffix}", yaxis=f"y{self.suffix}", zorder=round(10 * height),
                     legendgroup=made.name)  # fmt: skip
         self.figure.add_trace(made)
+        self.traces.append(made)
 
     def plot(
         self, x: ArrayLike, y: ArrayLike, style: LineStyle, name: str = "",
@@ -193,17 +170,17 @@ class Panel:
         for way, at in zip(WAYS, (x, y), strict=True):
             place[f"{way}ref"], at = f"{way}{self.suffix}", float(self.at(way, at)[0])
             place[way] = math.log10(at) if self.axis(way).type == "log" else at  # plotly's way
-        self.figure.add_annotation(
-            text=text, **place, showarrow=False, xanchor=side, yanchor=level, align="left",
-            xshift=PIXEL * shift[0], yshift=PIXEL * shift[1],
-            font={"color": color, "size": PIXEL * 8.5},
-        )  # fmt: skip
+        self.notes.append(place | {
+            "text": text, "showarrow": False, "xanchor": side, "yanchor": level, "align": "left",
+            "xshift": PIXEL * shift[0], "yshift": PIXEL * shift[1],
+            "font": {"color": color, "size": PIXEL * 8.5},
+        })  # fmt: skip
 
     def rule(self, style: LineStyle, x: float = math.nan, y: float = math.nan) -> None:
         """Draw a straight line across the panel, at x or at y."""
         way, other = WAYS if math.isnan(y) else WAYS[::-1]
         at = float(self.at(way, x if way == "x" else y)[0])
-        self.figure.add_shape({
+        self.rules.append({
             f"{way}0": at, f"{way}1": at, f"{way}ref": f"{way}{self.suffix}",
             f"{other}0": 0.0, f"{other}1": 1.0, f"{other}ref": f"{other}{self.suffix} domain",
             "type": "line", "line": {**style.line, "width": max(1.0, style.line["width"])},
@@ -276,6 +253,11 @@ class Drawing:
                 axis.update({name: first[name] for name in SHARED if first[name] is not None})
             if axis.showticklabels is False:
                 axis.title = ""
+        titles = [panel.heading for panel in self.panels if panel.title]
+        self.drawn.layout.annotations = titles + [
+            one for panel in self.panels for one in panel.notes
+        ]
+        self.drawn.layout.shapes = [one for panel in self.panels for one in panel.rules]
         self.drawn.layout.hovermode = "x unified" if is_unified else "closest"
         return self.drawn
 
@@ -382,10 +364,23 @@ def midway(centres: np.ndarray, is_log: bool = False) -> np.ndarray:
 
 
 def panels_of(figure: go.Figure) -> list[Panel]:
-    """Return a figure's panels from the top, those of a row from the left."""
+    """Return a figure's panels from the top, those of a row from the left.
+
+    Traces are in order from the lowest to the highest, bars first.
+    """
     names = (name for name in figure.layout if name.startswith("xaxis"))
-    panels = [Panel(figure, name.removeprefix("xaxis")) for name in names]
-    return sorted(panels, key=lambda one: (-round(one.y.domain[0], 6), one.x.domain[0]))
+    panels = {f"x{suffix}": Panel(figure, suffix) for suffix in (name[5:] for name in names)}
+    for trace in sorted(figure.data, key=lambda one: (one.type != "bar", one.zorder)):
+        panels[trace.xaxis].traces.append(trace)
+    for note in figure.layout.annotations:
+        panel = panels[note.xref.partition(" ")[0]]
+        if note.name == "title":
+            panel.title = note.text
+        else:
+            panel.notes.append(note)
+    for rule in figure.layout.shapes:
+        panels[rule.xref.partition(" ")[0]].rules.append(rule)
+    return sorted(panels.values(), key=lambda one: (-round(one.y.domain[0], 6), one.x.domain[0]))
 
 
 def one_line(title: str) -> str:
