@@ -10,7 +10,7 @@ import io
 import itertools
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -194,10 +194,6 @@ class Panel:
             ends = [math.log10(end) for end in ends]
         axis.range = [None if math.isnan(end) else end for end in ends]
 
-    def scale_alike(self) -> None:
-        """Draw both axes to one scale."""
-        self.y.scaleanchor = f"x{self.suffix}"
-
     def name_ticks(self, way: Way, words: Sequence[str], places: ArrayLike = ()) -> None:
         """Set words as ticks at places, or at 0, 1, 2 and so on."""
         axis = self.axis(way)
@@ -319,24 +315,10 @@ def make_grid(
 # ---- shapes of what is drawn --------------------------------------------------------------------
 
 
-def circle(radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return x and y of a circle around the origin."""
-    turn = np.linspace(0.0, 2.0 * np.pi, 361)
-    return radius * np.cos(turn), radius * np.sin(turn)
-
-
 def rectangle(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return x and y of the outline around some places."""
     (left, right), (low, high) = (x.min(), x.max()), (y.min(), y.max())
     return np.array([left, right, right, left, left]), np.array([low, low, high, high, low])
-
-
-def join_with_gaps(parts: Iterable[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Return x and y of lines, shape (n, 2) each, one after the other with nan between them."""
-    gap = np.full((1, 2), np.nan)
-    joined = [array for part in parts for array in (part, gap)][:-1]
-    x, y = np.concatenate(joined).T if joined else np.empty((2, 0))
-    return x, y
 
 
 def thin_places(size: int, most: int) -> np.ndarray:

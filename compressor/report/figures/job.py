@@ -10,7 +10,7 @@ from compressor import analysis
 from compressor.cases import Sensor
 from compressor.metrics import JOINTS
 from compressor.report.figures import curves, style
-from compressor.report.figures.drawing import WAYS, Panel, circle, join_with_gaps, make_grid
+from compressor.report.figures.drawing import WAYS, Panel, make_grid
 from compressor.report.figures.sweep_data import MEASURES
 from compressor.report.figures.table import DrawnFigure, Number, figure, spell, spell_span
 from compressor.store import CLIPPED
@@ -262,8 +262,8 @@ def plot_events(
     """
     lanes = [*spans]
     for number, own in enumerate(spans.values()):
-        x, y = join_with_gaps(np.array([(at, -number) for at in span]) for span in sorted(own))
-        panel.plot(x, y, OPEN, lanes[number], listed=False)
+        at = np.array([end for span in sorted(own) for end in (*span, np.nan)][:-1])
+        panel.plot(at, 0.0 * at - number, OPEN, lanes[number], listed=False)
     marks = [(name, at, *BY_JOINT[joint]) for name, (at, joint) in struck.items()]
     marks.append(("reversals", np.array(reversals), style.RED, "square"))
     for name, angles, color, shape in marks:
@@ -293,16 +293,13 @@ def draw_cards(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
     for panel in panels.flat:
         panel.label("y", "pressure ({}, absolute)", "MPa")
     degrees, revolution = analysis.last_revolution(run)
+    seconds, numbers = float(np.ptp(revolution["time"].values)), []
     for end, gas in analysis.end_states(revolution).items():
         over_volume.plot(gas.volume, gas.pressure, BY_END[end], f"{end} end")
         over_angle.plot(degrees, gas.pressure, BY_END[end], f"{end} end")
+        numbers.append((f"indicated power, {end} end", spell(1e-3 * gas.work / seconds, "kW")))
     over_angle.x.dtick = 90.0
     over_angle.span("x", degrees[0], degrees[-1])
-    seconds = float(revolution["time"][-1] - revolution["time"][0])
-    numbers = [
-        (f"indicated power, {end} end", spell(1e-3 * gas.work / seconds, "kW"))
-        for end, gas in analysis.end_states(revolution).items()
-    ]
     sentence = (
         "Pressure of the gas over its volume and over crank angle, in the last settled revolution, "
         "as it presses on the piston."
@@ -312,11 +309,12 @@ def draw_cards(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
 
 @figure("job", "spectra", "order spectrum of the force on the frame along the cylinder")
 def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
-    """Return the order spectrum of X."""
+    """Return the order spectrum of X, on a log scale from order 1 on."""
     drawing, panels = make_grid(1, 1, 3.2, units=units)
     (panel,) = panels.flat
     panel.label("y", "amplitude of X ({})", "N")
-    numbers = []
+    panel.rule(MARK, x=analysis.ORDER)
+    numbers, top = [], 0.0
     both = (
         (run, THIS, "this", f"rms of X above order {analysis.ORDER}"),
         (twin, TWIN, "twin", "without clearance"),
@@ -324,8 +322,14 @@ def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     for one, line, name, label in both:
         if one is not None:
             found = analysis.shaking(one)
-            plot_lines(panel, found.amplitudes, line, NAMES[name])
+            amplitudes = found.amplitudes[1 : MAX_ORDERS + 1]
+            panel.plot(np.arange(1, amplitudes.size + 1), amplitudes, line, NAMES[name])
+            panel.span("x", 0, amplitudes.size)
+            top = max(top, amplitudes.max())
             numbers.append((label, spell(found.above, "N", units)))
+    panel.y.type = "log"
+    if top > 0:
+        panel.span("y", top * 10.0**-DECADES, 3 * top)
     panel.x.title = ORDERS_AXIS
     step = spell_step(analysis.last_revolution(run)[0])
     sentence = (
@@ -335,32 +339,19 @@ def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     return DrawnFigure(drawing.figure(), sentence + caution(run), numbers)
 
 
-def plot_lines(panel: Panel, amplitudes: np.ndarray, line: style.LineStyle, name: str) -> None:
-    """Draw amplitudes of the orders 0, 1, ..., (k,), on a log scale from 1 on; mark `ORDER`."""
-    amplitudes = amplitudes[1 : MAX_ORDERS + 1]
-    orders = np.arange(1, amplitudes.size + 1)
-    panel.plot(orders, amplitudes, line, name)
-    panel.y.type, before = "log", panel.y.range
-    others = 10.0 ** before[1] / panel.factors["y"] / 3.0 if before else 0.0
-    top = max(amplitudes.max(), others)
-    if top > 0:
-        panel.span("y", top * 10.0**-DECADES, 3 * top)
-    panel.span("x", 0, orders[-1])
-    if not panel.rules:
-        panel.rule(MARK, x=analysis.ORDER)
-
-
 @figure("job", "orbits", "orbits of the journals", "clearance")
 def draw_orbits(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
     """Return the journal's orbit in each bore with clearance over the last revolution."""
     joints = analysis.joints_with_clearance(run)
     drawing, panels = make_grid(1, len(joints), 5.4, units=units)
-    for panel, joint in zip(panels.flat, joints, strict=True):
-        plot_orbit(panel, run, joint)
-    _, revolution = analysis.last_revolution(run)
+    degrees, revolution = analysis.last_revolution(run)
     numbers = []
-    for joint in joints:
-        depth = revolution["penetration"].sel(joint=joint).values
+    for panel, (joint, clearance) in zip(panels.flat, joints.items(), strict=True):
+        here = revolution.sel(joint=joint)
+        place = MICROMETRE * here["eccentricity"].transpose("time", "axis").values
+        plot_orbit(panel, degrees, place, MICROMETRE * clearance)
+        panel.title = f"{analysis.SPOKEN[joint]}; circle: clearance {1e3 * clearance:.3g} mm"
+        depth = here["penetration"].values
         off = spell(100.0 * (depth < 0).mean(), "% of the time")
         numbers += [
             (f"{analysis.SPOKEN[joint]}, off its wall", off),
@@ -370,24 +361,19 @@ def draw_orbits(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFig
     return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)
 
 
-def plot_orbit(panel: Panel, run: xr.Dataset, joint: str) -> None:
-    """Draw one orbit, to scale, in its clearance circle; marks stand at every quarter turn."""
-    degrees, revolution = analysis.last_revolution(run)
-    place = (
-        revolution["eccentricity"].sel(joint=joint).transpose("time", "axis").values * MICROMETRE
-    )
-    clearance = analysis.joints_with_clearance(run)[joint] * MICROMETRE
+def plot_orbit(panel: Panel, degrees: np.ndarray, place: np.ndarray, clearance: float) -> None:
+    """Draw one orbit (µm), to scale, in its clearance circle; marks stand at each quarter turn."""
     panel.label("x", "e<sub>x</sub> ({}), along the cylinder", "µm")
     panel.label("y", "e<sub>y</sub> ({})", "µm")
-    panel.plot(*circle(clearance), style.LineStyle(style.BLACK, linewidth=1.0, zorder=1.0))
+    turn = np.linspace(0.0, 2.0 * np.pi, 361)
+    wall = style.LineStyle(style.BLACK, linewidth=1.0, zorder=1.0)
+    panel.plot(clearance * np.cos(turn), clearance * np.sin(turn), wall)
     panel.plot(place[:, 0], place[:, 1], PATH, "path of the journal's centre")
     for angle, (name, shape) in CORNERS.items():
         nearest = np.argmin(np.abs((degrees - angle + 180) % 360 - 180))
-        x, y = place[nearest]
-        panel.plot(x, y, style.mark(style.GOLD, shape, 7, 4, edge=style.BLACK), name)
+        panel.plot(*place[nearest], style.mark(style.GOLD, shape, 7, 4, edge=style.BLACK), name)
     room = 1.08 * max(clearance, np.linalg.norm(place, axis=1).max())
-    panel.scale_alike()
-    panel.title = f"{analysis.SPOKEN[joint]}; circle: clearance {clearance / 1e3:.3g} mm"
+    panel.y.scaleanchor = f"x{panel.suffix}"
     for way in WAYS:
         panel.span(way, -room, room)
         panel.axis(way).nticks = 5

@@ -317,7 +317,7 @@ def draw_contour(panel: Panel, cam: analysis.Cam, angles: np.ndarray) -> None:
     """Draw the closed cam's pitch curve around its base circle."""
     x, y = cam.contour(angles)
     panel.title = "(a) contour of the closed cam"
-    panel.scale_alike()
+    panel.y.scaleanchor = f"x{panel.suffix}"
     panel.label("x", "x ({})", "mm")
     panel.label("y", "y ({})", "mm")
     rim = analysis.BASE_RADIUS * 1e3 * np.array([np.cos(angles), np.sin(angles)])
