@@ -219,17 +219,22 @@ def contact_force(joint: str, axis: str) -> curves.Quantity:
 def draw_relation(runs: curves.Runs, joint: str, units: Units = "usual") -> DrawnFigure:
     """Return one panel a clearance: every stored sample and the regression line."""
     drawing, panels = make_grid(1, 3, 4.0, units=units, share_x="all", share_y="all")
+    found = []
     for panel, letter, clearance in zip(panels.flat, "abc", analysis.CLEARANCES, strict=True):
-        run = runs[analysis.label(joint, clearance)]
-        name = f"{clearance:g} mm"
+        run, name = runs[analysis.label(joint, clearance)], f"{clearance:g} mm"
+        settled = analysis.settled_part(run)
+        a, force = settled["acceleration"].values, contact_force(joint, "x").values(settled)
         panel.label("x", "horizontal force on the rod ({})", "kN")
         panel.label("y", "acceleration ({})", "m/s²")
-        scatter(panel, analysis.settled_part(run), joint, style.BY_CLEARANCE[clearance].color, name)
-        regress(panel, run, joint)
+        color = style.BY_CLEARANCE[clearance].color
+        dots = style.mark(color, "circle", 2.2, edge_width=0.0, alpha=0.45)
+        panel.plot(force, a, dots, name, listed=False)
+        found.append(fit := analysis.force_relation(run, joint))
+        ends = np.array([a.min(), a.max()])
+        fitted = (fit.slope * ends + fit.intercept) * curves.KILONEWTON
+        line = style.LineStyle(style.BLACK, linewidth=1.1)
+        panel.plot(fitted, ends, line, "fit", listed=False)
         panel.title = f"({letter}) {name}"
-    found = [
-        analysis.force_relation(runs[analysis.label(joint, c)], joint) for c in analysis.CLEARANCES
-    ]
     sentence = (
         "A dot for each stored sample; the line is the least-squares fit of force on acceleration, "
         "whose slope is a mass."
@@ -240,22 +245,6 @@ def draw_relation(runs: curves.Runs, joint: str, units: Units = "usual") -> Draw
         ("r²", spell([one.r2 for one in found])),
     ]
     return DrawnFigure(drawing.figure(), sentence, numbers)
-
-
-def scatter(panel: Panel, run: xr.Dataset, joint: str, color: str, name: str) -> None:
-    """Draw a dot for every stored sample."""
-    force = contact_force(joint, "x").values(run)
-    dots = style.mark(color, "circle", 2.2, edge_width=0.0, alpha=0.45)
-    panel.plot(force, run["acceleration"].values, dots, name, listed=False)
-
-
-def regress(panel: Panel, run: xr.Dataset, joint: str) -> None:
-    """Draw the line of `force_relation` over the data's accelerations."""
-    relation = analysis.force_relation(run, joint)
-    a = analysis.settled_part(run)["acceleration"].values
-    ends = np.array([a.min(), a.max()])
-    force = (relation.slope * ends + relation.intercept) * curves.KILONEWTON
-    panel.plot(force, ends, style.LineStyle(style.BLACK, linewidth=1.1), "fit", listed=False)
 
 
 CLOSED = style.LineStyle(style.BLUE, (), 1.8, 2.3)
