@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import plotly.graph_objects as go
 
 from compressor import analysis
 from compressor.report.figures import style
@@ -36,36 +35,27 @@ CYCLE_DECADES = 2  # below the greatest vibration
 ROW, LEAST = 0.24, 3.4  # inches: of a row, and of all
 
 
-def start_map(
+def draw_map(
     rows: Sequence[SweptRow], title: str, x: np.ndarray, table: np.ndarray,
-    ends: tuple[float, float], name: str, unit: str, units: Units,
+    ends: tuple[float, float], name: str, unit: str, beside: np.ndarray, words: str, top: float,
+    units: Units,
 ) -> tuple[Drawing, Panel]:  # fmt: skip
     """Return a drawing with a table in colour, a row a value, and the panel of that.
 
     title: of the rows; x: of the table's columns; ends: of the colours, which `name` titles,
-    with `{}` for the unit.
+    with `{}` for the unit; beside: a number a row, on an axis up to `top`, titled in words.
     """
-    drawing, panels = make_grid(
-        1, 2, height(len(rows)) + 0.9, widths=(3, 1), units=units, share_y="all"
-    )
-    image, shown = panels[0, 0], np.clip(table, *ends)  # nan stays
-    image.map(
-        x, np.arange(len(rows)), shown, style.palette("cividis"), ends, name, unit, is_log=True
-    )
+    height = min(9.0, max(LEAST, ROW * len(rows))) + 0.9
+    drawing, panels = make_grid(1, 2, height, widths=(3, 1), units=units, share_y="all")
+    (image, numbers), at = panels[0], np.arange(len(rows), dtype=float)
+    shown = np.clip(table, *ends)  # nan stays
+    image.map(x, at, shown, style.palette("cividis"), ends, name, unit, is_log=True)
     label_rows(image, rows, title)
-    return drawing, image
-
-
-def finish_map(
-    drawing: Drawing, values: np.ndarray, title: str, unit: str, top: float
-) -> go.Figure:
-    """Return a figure of `start_map` with a number a row beside the map; top: of its axis."""
-    _, beside = drawing.panels
+    numbers.label("x", words, unit)
     dots = style.LineStyle(style.BLUE, linewidth=1.5, marker="circle", markersize=3.5)
-    beside.label("x", title, unit)
-    beside.plot(values, np.arange(values.size, dtype=float), dots)
-    beside.span("x", 0, top)
-    return drawing.figure()
+    numbers.plot(beside, at, dots)
+    numbers.span("x", 0, top)
+    return drawing, image
 
 
 @figure("study", "cycles", "vibration over crank angle")
@@ -78,9 +68,9 @@ def draw_cycles(rows: Sequence[SweptRow], title: str, units: Units = "usual") ->
     table = np.array([one.degree_peaks if one else np.full(360, np.nan) for one in found])
     top = np.nanmax(table)
     ends = top * 10.0**-CYCLE_DECADES, top
-    drawing, image = start_map(
-        rows, title, np.arange(360) + 0.5, table, ends, "|a| ({})", "m/s²", units
-    )
+    loud, angles = np.array([loudest(one) if one else (np.nan, np.nan) for one in found]).T
+    drawing, image = draw_map(rows, title, np.arange(360) + 0.5, table, ends, "|a| ({})", "m/s²",
+                              loud, "peak ({})", 1.08 * top, units)  # fmt: skip
     corners = [[at for at, _ in one.events] if one else [] for one in found]
     reversals = [one.reversals if one else () for one in found]
     has_cam = any(event.startswith("cam") for one in found if one for _, event in one.events)
@@ -100,7 +90,6 @@ def draw_cycles(rows: Sequence[SweptRow], title: str, units: Units = "usual") ->
         f"The greatest magnitude of the {kind} in each degree of the last settled revolution, "
         f"{describe_rows(rows, title)}.{left_out(rows)}"
     )
-    loud, angles = np.array([loudest(one) if one else (np.nan, np.nan) for one in found]).T
     most = np.nanargmax(loud)
     counts = [len(one.reversals) for one in found if one]
     numbers = [
@@ -108,9 +97,7 @@ def draw_cycles(rows: Sequence[SweptRow], title: str, units: Units = "usual") ->
         ("the greatest comes at", f"{angles[most]:.0f}°, {spell(G * loud[most], 'g')}"),
         ("changes of the rod load's side a revolution", ", ".join(map(str, sorted({*counts})))),
     ]
-    return DrawnFigure(
-        finish_map(drawing, loud, "peak ({})", "m/s²", 1.08 * top), sentence, numbers
-    )
+    return DrawnFigure(drawing.figure(), sentence, numbers)
 
 
 @figure("study", "waterfall", "order spectra of the force on the frame along the cylinder")
@@ -126,16 +113,17 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str, units: Units = "usual")
     if top < 1e-9 * np.nanmax(table):  # ideal joints: rounding
         top = np.nanmax(table)
     ends = top * 10.0**-MAP_DECADES, top
-    drawing, image = start_map(rows, title, np.arange(1, size + 1), table, ends,
-                               "amplitude of X ({})", "N", units)  # fmt: skip
-    image.rule(style.LineStyle(style.RED, (4, 1.5)), x=analysis.ORDER + 0.5)
-    image.x.title = ORDERS_AXIS + f"; dashed: order {analysis.ORDER}"
     above = np.array([one.above if one else np.nan for one in found])
     words = f"rms of X above<br>order {analysis.ORDER} ({{}})"
-    figure = finish_map(drawing, above, words, "N", max(1.0, 1.08 * np.nanmax(above)))
+    drawing, image = draw_map(
+        rows, title, np.arange(1, size + 1), table, ends, "amplitude of X ({})", "N", above, words,
+        max(1.0, 1.08 * np.nanmax(above)), units,
+    )  # fmt: skip
+    image.rule(style.LineStyle(style.RED, (4, 1.5)), x=analysis.ORDER + 0.5)
+    image.x.title = ORDERS_AXIS + f"; dashed: order {analysis.ORDER}"
     numbers = spell_ends(f"rms of X above order {analysis.ORDER}", above, rows, "N", units)
     sentence = f"Order spectra of X, {describe_rows(rows, title)}.{left_out(rows)}"
-    return DrawnFigure(figure, sentence, numbers)
+    return DrawnFigure(drawing.figure(), sentence, numbers)
 
 
 def describe_rows(rows: Sequence[SweptRow], title: str) -> str:
@@ -173,8 +161,3 @@ def label_rows(panel: Panel, rows: Sequence[SweptRow], title: str) -> None:
     panel.figure.layout.meta = words  # of all rows, for the table
     panel.span("y", -0.5, len(rows) - 0.5)
     panel.y.title, panel.x.showgrid, panel.y.showgrid = title, False, False
-
-
-def height(rows: int) -> float:
-    """Return the height (inches) of so many rows."""
-    return min(9.0, max(LEAST, ROW * rows))
