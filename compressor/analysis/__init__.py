@@ -15,9 +15,9 @@ from compressor.analysis.effects import (
 )
 from compressor.analysis.machine_numbers import (
     MachineDescription,
-    describe_cases,
     describe_machine,
     draw_jobs,
+    machine_numbers,
 )
 from compressor.analysis.margins import mean_peak
 from compressor.analysis.runs import (

@@ -13,7 +13,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -116,12 +116,6 @@ class Caution(NamedTuple):
     of: int
 
 
-def is_usual(key: str, value: float) -> bool:
-    """Return whether a value is usual for a key; limits may come from a conversion, and count."""
-    low, high, _ = USUAL_KEYS[key]
-    return low * (1 - 1e-9) <= value <= high * (1 + 1e-9)
-
-
 def slips(cases: Sequence[Case]) -> list[Caution]:
     """Return the keys of a study's cases whose values all look like another unit's."""
     found = []
@@ -151,13 +145,17 @@ def values_of(case: Case, key: str) -> list[float]:
 
 def other_unit(key: str, values: Sequence[float]) -> str:
     """Return the unit in which unusual values would all be usual, "" where there is none."""
-    if not values or any(value <= 0 or is_usual(key, value) for value in values):
-        return ""
     low, high, units = USUAL_KEYS[key]
+
+    def is_usual(value: float) -> bool:  # limits may come from a conversion, and count
+        return low * (1 - 1e-9) <= value <= high * (1 + 1e-9)
+
+    if not values or any(value <= 0 or is_usual(value) for value in values):
+        return ""
     row, middle = row_of(key), sum(map(math.log, values)) / len(values)
     default = float(row.default) if row and row.default else math.sqrt(low * high)
     return min(
-        (name for name in units if all(is_usual(key, value * units[name]) for value in values)),
+        (name for name in units if all(is_usual(value * units[name]) for value in values)),
         key=lambda name: abs(middle + math.log(units[name] / default)),
         default="",
     )
@@ -174,16 +172,6 @@ NEAR_BUCKLING = 0.5  # of Euler's load; beyond it a rod bends by more than its i
 NEAR_RESONANCE = 0.1  # of an order's frequency: nearer, the body's motion is a resonance's
 
 Remarks = Iterator[tuple[str, str]]  # of a case: a key, and what is odd about it
-
-
-def check_judged(case: Case) -> Remarks:
-    """Yield values outside the range that the program was judged on."""
-    yield from outside_judged(case).items()
-
-
-def check_paper_pin(case: Case) -> Remarks:
-    """Yield defaults that belong to the paper's pin, beside another pin."""
-    yield from paper_notes(case).items()
 
 
 def check_machine(case: Case) -> Remarks:
@@ -335,10 +323,10 @@ def check_friction(case: Case) -> Remarks:
         yield "friction.static", f"{text}: friction grows as bodies slide"
 
 
-Check = Callable[[Case], Remarks]
+Check = Callable[[Case], Any]  # that gives `Remarks`, or a dictionary of them
 CHECKS: tuple[Check, ...] = (
-    check_machine, check_judged, check_paper_pin, check_body, check_depth,
-    check_rod, check_cards, check_friction,
+    check_machine, outside_judged, paper_notes, check_body, check_depth, check_rod, check_cards,
+    check_friction,
 )  # fmt: skip
 
 
@@ -374,7 +362,7 @@ def cautions(study: Study) -> list[Caution]:
             found[check, key] = one._replace(jobs=one.jobs + 1)
     told = []
     for (check, key), one in sorted(found.items(), key=lambda item: -item[1].jobs):
-        if key in units and check is check_judged:
+        if key in units and check is outside_judged:
             message = f"{units[key].message}; {one.message}"
             units[key] = units[key]._replace(message=message)
         elif key not in units and not (units and check is check_depth):

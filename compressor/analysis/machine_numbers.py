@@ -245,12 +245,7 @@ def describe_machine(study: Study) -> MachineDescription:
     Takes some milliseconds a machine; a sweep of clearances has one.
     """
     cases = sample_cases(study, MAX_CASES)
-    return describe_cases(cases, len(study.selected))
-
-
-def describe_cases(cases: Sequence[Case], jobs: int) -> MachineDescription:
-    """Return what cases, of so many jobs, say of their machine."""
-    return MachineDescription(machine_numbers(cases), len(cases), jobs)
+    return MachineDescription(machine_numbers(cases), len(cases), len(study.selected))
 
 
 def machine_numbers(cases: Sequence[Case]) -> tuple[MachineNumber, ...]:

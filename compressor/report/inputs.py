@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from compressor.analysis import describe_cases, draw_jobs
+from compressor.analysis import MachineDescription, draw_jobs, machine_numbers
 from compressor.cases import DOUBLES, Case, keys_of, reads, row_of, stands_for, value_of
 from compressor.digits import setting
 from compressor.report.figures.sweep_data import name_in_words
@@ -28,7 +28,7 @@ def find_inputs(stored: Stored, study: StoredStudy) -> list[tuple[str, Lines]]:
     cases = [case for place in draw_jobs(places) if (case := stored.case_at(place))]
     if not cases:
         return []
-    machine = describe_cases(cases, study.jobs)
+    machine = MachineDescription(machine_numbers(cases), len(cases), study.jobs)
     swept = {part for axis in study.axes for part in (axis.key, *stands_for(axis.key))}
     fixed = {
         key: value
