@@ -38,7 +38,7 @@ from compressor.report.page import (
     format_measure,
     number,
 )
-from compressor.store import Folder, Stored, StoredStudy
+from compressor.store import Folder, StoredStudy
 from compressor.units import Units
 
 
@@ -64,12 +64,6 @@ def assumptions_section(has_claims: bool, has_cam: bool) -> Section:
         "each moves them. Metrics leave out the start-up (solve.settle_rev).",
     ]
     return Section("assumptions", "What to keep in mind", SectionContent(lines=lines))
-
-
-def last_case(stored: Stored, study: StoredStudy) -> Case | None:
-    """Return the case of a study's last stored job; None where this version knows none."""
-    places = [place for place in stored.find([*study.keys]).tolist() if place >= 0]
-    return stored.case_at(places[-1]) if places else None
 
 
 LIBRARIES = ("numpy", "scipy", "numba", "xarray", "h5py", "matplotlib")
@@ -294,34 +288,28 @@ def finding(
     always = measure.variable in ALWAYS
     title = measure.title[0].upper() + measure.title[1:]
     sure = np.flatnonzero(~np.isnan(measure.known(values, bars))).tolist()
-    if not sure:
-        if not always or np.isnan(values).all():
-            return None
-        return MetricChange(title, "", "", UNKNOWN, "", "within its error bar", 0.0, always)
-    low, high = (pick(sure, key=lambda n: values[n]) for pick in (min, max))
 
     def text(n: int) -> str:
-        return (
-            f"{format_measure(measure, float(values[n]), float(bars[n]))} {measure.unit}".rstrip()
-        )
+        number = format_measure(measure, float(values[n]), float(bars[n]))
+        return f"{number} {measure.unit}".rstrip()
 
+    def unchanged(value: str, words: str = "") -> MetricChange | None:
+        return MetricChange(title, "", "", value, "", words, 0.0, always) if always else None
+
+    if not sure:
+        return None if np.isnan(values).all() else unchanged(UNKNOWN, "within its error bar")
+    low, high = (pick(sure, key=lambda n: values[n]) for pick in (min, max))
     if len(values) == 1:
         return MetricChange(title, "", "", text(high), "", "", 0.0, always)
     least, most = float(values[low]), float(values[high])
     if not differ_beyond_bars(values[sure], bars[sure]):
-        same = (
-            "the same in all jobs within its error bars"
-            if len(sure) == len(values)
-            else f"known of {len(sure)} of {len(values)} jobs, the same within its error bars"
-            if len(sure) > 1
-            else f"known of 1 of {len(values)} jobs"
-        )
-        return MetricChange(title, "", "", text(high), "", same, 0.0, always) if always else None
+        some = f"known of {len(sure)} of {len(values)} jobs" * (len(sure) < len(values))
+        same = f"the same{' in all jobs' * (not some)} within its error bars" * (len(sure) > 1)
+        return unchanged(text(high), ", ".join(filter(None, (some, same))))
     ratio = most / least if least * most > 0.0 else math.inf
     if max(ratio, 1.0 / ratio) < MIN_RATIO:
         span = f"{number(least)} to {number(most)} {measure.unit}".rstrip()
-        same = "nearly the same in all jobs"
-        return MetricChange(title, "", "", span, "", same, 0.0, always) if always else None
+        return unchanged(span, "nearly the same in all jobs")
     rank = min(abs(math.log(ratio)), FROM_ZERO)
     change = f"{ratio:.3g} times" if ratio < 1e3 else "from nearly nothing"
     change = change if least >= 0.0 else ""

@@ -12,7 +12,6 @@ import xarray as xr
 from compressor import analysis, store
 from compressor.cases import Axis, Case
 from compressor.report import page, study_section
-from compressor.report.answer import last_case
 from compressor.report.figures import FIGURES, Figure
 from compressor.report.figures.pictures import draw_all
 from compressor.report.figures.sweep_data import measures
@@ -99,7 +98,8 @@ def own_figures(
     A figure needs those of the paper's cases that it shows among the study's jobs. The note is on
     the study's section; there are no sections where nothing can be drawn.
     """
-    case = last_case(stored, study)
+    places = [place for place in stored.find([*study.keys]).tolist() if place >= 0]
+    case = stored.case_at(places[-1]) if places else None
     runs = find_runs(stored, [study], analysis.cases_of(case)).usable if case else {}
     alike = comparable(runs.values())
     figures = draw_paper(runs, units, study.name) if alike else []
