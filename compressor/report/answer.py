@@ -12,6 +12,7 @@ import platform
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import xarray as xr
@@ -137,26 +138,18 @@ class StudyLine:
     has_result: bool = True
 
 
-@dataclass(frozen=True)
-class FirstScreen:
-    """The first screen; cautions: of jobs that are chaotic or not settled, a sentence each."""
-
-    lines: Sequence[StudyLine]
-    findings: Sequence[tuple[str, Sequence[MetricChange]]]
-    claims: Sequence[Claim]
-    cautions: Sequence[str] = ()
-
-    @property
-    def no_finding(self) -> str:
-        """Return the sentence that stands in place of findings."""
-        if not any(line.has_result for line in self.lines):
-            return "No job has a result."
-        return f"No metric changes by more than {100 * (MIN_RATIO - 1):.0f} % and its error bars."
-
-
-def answer_section(answer: FirstScreen) -> Section:
-    """Return the section that the page begins with."""
-    return Section("answer", "The answer", answer, "answer.html")
+def answer_section(
+    lines: Sequence[StudyLine], findings: Sequence[tuple[str, Sequence[MetricChange]]],
+    claims: Sequence[Claim], cautions: Sequence[str],
+) -> Section:  # fmt: skip
+    """Return the section that the page begins with; cautions: a sentence each."""
+    no_finding = "No job has a result."
+    if any(line.has_result for line in lines):
+        least = 100 * (MIN_RATIO - 1)
+        no_finding = f"No metric changes by more than {least:.0f} % and its error bars."
+    content = SimpleNamespace(lines=lines, findings=findings, claims=claims, cautions=cautions,
+                              no_finding=no_finding)  # fmt: skip
+    return Section("answer", "The answer", content, "answer.html")
 
 
 def study_findings(data: xr.Dataset, units: Units = "usual") -> list[MetricChange]:

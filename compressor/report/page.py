@@ -198,11 +198,3 @@ def document(
         sections=sections, results=results, series=series, title=title, subject=SUBJECT,
         scripts=scripts,
     )  # fmt: skip
-
-
-class StudyNote(NamedTuple):
-    """A line in the section of a study, and a link below it: the id of a section, and its words."""
-
-    text: str
-    anchor: str
-    link: str

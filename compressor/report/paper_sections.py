@@ -92,7 +92,7 @@ UNEQUAL = "whose runs do not settle at one crank angle, for a whole revolution"
 
 def own_figures(
     stored: Stored, study: StoredStudy, units: Units
-) -> tuple[page.StudyNote, list[page.Section]]:
+) -> tuple[tuple[str, str, str], list[page.Section]]:
     """Return the paper's figures and claims of the machine of a study's last job.
 
     A figure needs those of the paper's cases that it shows among the study's jobs. The note is on
@@ -106,11 +106,11 @@ def own_figures(
     if not figures:
         reason = "since no figure has all its cases there with series" if alike else UNEQUAL
         text = f"The paper's figures are not drawn of this machine, {reason}"
-        return page.StudyNote(text, study_section.file_name("jobs", study.name), "Its jobs"), []
+        return (text, study_section.file_name("jobs", study.name), "Its jobs"), []
     text = "The paper's figures are drawn of this machine if all their cases are there with series"
     anchors = [study_section.file_name(what, study.name) for what in ("figures", "claims")]
     titles = [f"{study.name}: the paper's {what}" for what in ("figures", "claims")]
-    return page.StudyNote(text, anchors[0], "Figures and claims"), [
+    return (text, anchors[0], "Figures and claims"), [
         page.Section(anchors[0], titles[0], page.SectionContent(figures=figures)),
         page.Section(anchors[1], titles[1], analysis.claims(runs), "claims.html"),
     ]

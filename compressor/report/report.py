@@ -116,7 +116,7 @@ def build_report(
         "figures", "The paper's figures", page.SectionContent(figures=paper_figures)
     )
     sections = [
-        answer.answer_section(summarise(drawn, cases, judged, left_out, units)),
+        summarise(drawn, cases, judged, left_out, units),
         *(one.section for one in drawn),
         *[of_paper] * bool(paper_figures),
         *chain(*(sections for _, sections in of_own.values())),
@@ -170,7 +170,7 @@ class DrawnStudy(NamedTuple):
 def drawn_study(
     stored: Stored,
     study: StoredStudy,
-    notes: Sequence[page.StudyNote],
+    notes: Sequence[tuple[str, str, str]],
     limits: Limits,
     units: Units,
 ) -> DrawnStudy:
@@ -201,8 +201,8 @@ def drawn_study(
 
 def describe_run(name: str, anchor: str, data: xr.Dataset) -> answer.StudyLine:
     """Return what was run, and how it ended; anchor: of its section."""
-    counts = study_section.job_counts(data)
-    return answer.StudyLine(name, anchor, counts.text, bool(counts.failed), bool(counts.ok))
+    words, found = study_section.count_jobs(data)
+    return answer.StudyLine(name, anchor, words, found["failed"] > 0, found["ok"] > 0)
 
 
 def motion_cautions(stored: Stored, study: StoredStudy, data: xr.Dataset) -> list[str]:
@@ -222,7 +222,7 @@ def summarise(
     judged: Sequence[analysis.Claim],
     left_out: Sequence[str],
     units: Units = "usual",
-) -> answer.FirstScreen:
+) -> page.Section:
     """Return the page's first screen.
 
     cases: of the paper, as of `paper_data`; judged: its claims; left_out: studies, and why.
@@ -242,4 +242,4 @@ def summarise(
     ]
     cautions = [f"{text[0].upper()}{text[1:]}." for text in left_out]
     cautions += [text for one in drawn for text in one.cautions]
-    return answer.FirstScreen(lines, shown, judged, cautions)
+    return answer.answer_section(lines, shown, judged, cautions)

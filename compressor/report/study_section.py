@@ -1,9 +1,9 @@
 """The section of a report about a user's own study: its failures, its table and its figures."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from types import SimpleNamespace
 
 import xarray as xr
 
@@ -13,9 +13,9 @@ from compressor.reasons import remedy
 from compressor.report import page
 from compressor.report.figures.sweep_data import measures, swept_values
 from compressor.report.figures.table import DrawnFigure
-from compressor.report.inputs import Lines, find_inputs
+from compressor.report.inputs import find_inputs
 from compressor.report.limits import NO_LIMITS, Limits
-from compressor.report.side_by_side import HealthyAndWorn, compare_healthy
+from compressor.report.side_by_side import compare_healthy
 from compressor.store import Stored, StoredStudy, study_caveats
 from compressor.units import Units
 
@@ -23,59 +23,24 @@ MAX_ROWS = 500
 KEY_DIGITS = 10  # digits of a job's key
 
 
-class Counts(NamedTuple):
-    """How many jobs of a study are ok, failed, or were not run."""
-
-    ok: int
-    failed: int
-    missing: int
-
-    @property
-    def text(self) -> str:
-        """Return the counts in words."""
-        parts = [f"{plural(sum(self))}: {self.ok} ok"]
-        parts += [f"{self.failed} failed"] if self.failed else []
-        parts += [f"{self.missing} not run"] if self.missing else []
-        return ", ".join(parts)
-
-
-@dataclass(frozen=True)
-class StudyContent:
-    """What a page says of a study; jobs: the id of the section with its table.
-
-    caveats: what to know beside the numbers, a sentence each; failures: by reason, with remedies;
-    notes: lines that others add; beside: the machine without clearance; inputs: what was given,
-    swept and assumed.
-    """
-
-    study: StoredStudy
-    counts: str
-    caveats: Sequence[str]
-    failures: Sequence[str]
-    figures: Sequence[DrawnFigure]
-    jobs: str
-    notes: Sequence[page.StudyNote] = ()
-    beside: HealthyAndWorn | None = None
-    inputs: Sequence[tuple[str, Lines]] = ()
-
-
 def study_sections(
     stored: Stored,
     study: StoredStudy,
     data: xr.Dataset,
     figures: Sequence[DrawnFigure],
-    notes: Sequence[page.StudyNote] = (),
+    notes: Sequence[tuple[str, str, str]] = (),
     limits: Limits = NO_LIMITS,
     units: Units = "usual",
 ) -> tuple[page.Section, page.Section]:
     """Return the sections of a study as `open_study` gives it: figures and failures, and table.
 
-    notes: lines that others add to the first; limits: of metrics, whose zones the table shows.
+    notes: lines that others add to the first, each with the id of a section and a link's words;
+    limits: of metrics, whose zones the table shows.
     """
     anchor = file_name("jobs", study.name)
-    content = StudyContent(
+    content = SimpleNamespace(
         study=study,
-        counts=job_counts(data).text,
+        counts=count_jobs(data)[0],
         caveats=study_caveats(stored, study),
         failures=list_failures(stored, data),
         figures=figures,
@@ -106,11 +71,12 @@ def file_name(*words: str) -> str:
     return re.sub(r"[^A-Za-z0-9._-]", "_", "-".join(words))
 
 
-def job_counts(data: xr.Dataset) -> Counts:
-    """Return the numbers of a study's jobs that are ok, failed or were not run."""
-    status = data["status"].values
-    failed, missing = int((status == "failed").sum()), int((status == "missing").sum())
-    return Counts(status.size - failed - missing, failed, missing)
+def count_jobs(data: xr.Dataset) -> tuple[str, Counter[str]]:
+    """Return how many jobs of a study are ok, failed or missing, in words and by status."""
+    found = Counter(data["status"].values.ravel().tolist())
+    words = {"ok": "ok", "failed": "failed", "missing": "not run"}
+    parts = [f"{found[one]} {word}" for one, word in words.items() if found[one] or one == "ok"]
+    return f"{plural(found.total())}: {', '.join(parts)}", found
 
 
 def list_failures(stored: Stored, data: xr.Dataset) -> list[str]:
