@@ -15,7 +15,6 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from compressor.digits import MAX_DECIMAL, PAGE_DIGITS, by_bar, setting
-from compressor.outcome import Regime
 from compressor.report.figures import pictures
 from compressor.report.figures.drawing import as_csv
 from compressor.report.figures.sweep_data import Measure

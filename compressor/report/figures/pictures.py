@@ -44,7 +44,7 @@ from compressor.report.figures.style import PIXEL
 
 DPI = 150
 EDGE = 0.1  # inches, around what is drawn
-MAX_SHARED = 2000  # figures that two processes share: their numbers fit in any pipe
+MAX_SHARED = 256  # figures that two processes share: their numbers are a byte each
 LEGEND_WIDTH = 130  # characters, in a row of a legend
 MARKERS = {
     "circle": "o", "square": "s", "diamond": "D", "triangle-up": "^", "triangle-down": "v",
@@ -112,15 +112,11 @@ def draw_all(work: Sequence[Callable[[], Made]]) -> list[Made]:
         sys.stderr.write(f"drawing {plural(len(work), 'figure')}\n" * bool(work))
         sys.stderr.flush()
     here, there = os.pipe()  # of numbers, of which each process takes one at a time
-    numbers = range(len(work))[:MAX_SHARED]
-    os.write(there, b"".join(number.to_bytes(2) for number in numbers[::-1]))
+    os.write(there, bytes(range(len(work))[:MAX_SHARED])[::-1])
     os.close(there)
 
     def draw_some() -> dict[int, Made]:
-        return {number: work[number]() for number in map(int.from_bytes, iter(take, b""))}
-
-    def take() -> bytes:
-        return os.read(here, 2)
+        return {number: work[number]() for (number,) in iter(lambda: os.read(here, 1), b"")}
 
     try:
         with work_beside(draw_some) as others:
