@@ -65,11 +65,10 @@ def plot(words, folder, output, units, **chosen) -> int:
     swept axis. Nothing but what is stored is needed, and the files
     of `gas.indicator` of a job that has any.
     """
-    from compressor.report import PlotChoice, write_plots
+    from compressor.report import write_plots
     from compressor.store import writable_folder
 
     writable_folder(output, make=False)
-    choice = PlotChoice(units=units or "usual", **chosen)
-    for path, caption in write_plots(folder, output, words, choice):
+    for path, caption in write_plots(folder, output, words, units=units or "usual", **chosen):
         screen.print_text(str(path), f"  {caption}")
     return screen.DONE

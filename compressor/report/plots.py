@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -30,20 +30,6 @@ class PlotError(CompsimError):
     """What cannot be drawn: why, and what to do about it."""
 
     exit_code = 2
-
-
-@dataclass(frozen=True)
-class PlotChoice:
-    """What to draw: names of figures, all by default; of a study the axis and the other values.
-
-    over: the axis by its key or the end of it; at: `key=value` of other axes, else their first.
-    units: of the figures, as `compressor.units` has them.
-    """
-
-    what: tuple[str, ...] = ()
-    over: str = ""
-    at: tuple[str, ...] = ()
-    units: Units = "usual"
 
 
 def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tuple[str, ...]:
@@ -76,24 +62,33 @@ KEEP = "run it again with --set output.keep=series"
 
 
 def write_plots(
-    results: store.Folder, output: store.Folder, words: Sequence[str], choice: PlotChoice
+    results: store.Folder,
+    output: store.Folder,
+    words: Sequence[str],
+    what: Sequence[str] = (),
+    over: str = "",
+    at: Sequence[str] = (),
+    units: Units = "usual",
 ) -> Iterator[tuple[Path, str]]:
     """Draw a study by its name, or a job by the words that `show` takes; yield files and captions.
 
     A study of one job has a job's figures, too. words: the beginning of a job's key, or a study,
-    and `axis=value` until one job is left. Raises WrongName where they name none or several,
-    PlotError where it cannot be drawn; StoreError where the store cannot be read or the files not
-    be written.
+    and `axis=value` until one job is left. what: names of figures, all by default. over: a study's
+    axis by its key or the end of it; at: `key=value` of its other axes, else their first. Raises
+    WrongName where they name none or several, PlotError where it cannot be drawn; StoreError where
+    the store cannot be read or the files not be written.
     """
     stored, studies = store.read_store(results, warn=True), store.read_studies(results)
     named = {study.name: study for study in studies}
-    of_job = bool(choice.what) and {*choice.what} <= {*JOB}
+    of_job = bool(what) and {*what} <= {*JOB}
     if len(words) == 1 and words[0] in named and not (of_job and named[words[0]].jobs == 1):
-        drawn = draw_study(stored, named[words[0]], choice)
+        drawn = draw_study(stored, named[words[0]], what, over, at, units)
         stem = words[0]
     else:
         key = store.find_job(results, words, studies, stored.keys())
-        drawn = job_figures(stored, studies, key, choice)
+        if over or at:
+            raise PlotError(f"{key} is one job: --over and --at are for studies")
+        drawn = job_figures(stored, studies, key, what, units)
         stem = key[:KEY_DIGITS]
     for one in drawn:
         path = Path(output) / f"{file_name(stem, one.name)}.png"
@@ -101,12 +96,10 @@ def write_plots(
 
 
 def job_figures(
-    stored: Stored, studies: Sequence[StoredStudy], key: str, choice: PlotChoice
+    stored: Stored, studies: Sequence[StoredStudy], key: str, what: Sequence[str], units: Units
 ) -> Iterator[DrawnFigure]:
     """Yield the figures of a job that has time series."""
-    figures = choose_figures(choice.what, [*JOB], f"job {key}")
-    if choice.over or choice.at:
-        raise PlotError(f"{key} is one job: --over and --at are for studies")
+    figures = choose_figures(what, [*JOB], f"job {key}")
     run = drawable(stored, studies, key)
     try:
         worn = bool(analysis.joints_with_clearance(run))
@@ -117,14 +110,14 @@ def job_figures(
         "clearance": "has ideal joints",
         "gas": "has no gas in its cylinder: cards are of load: gas",
     }
-    for name in choice.what:
+    for name in what:
         for lack in (need for need in JOB[name].needs if not has[need]):
             raise PlotError(f"job {key} {why[lack]}, so that there is no figure {name!r} of it")
     twin = analysis.healthy_twin(run) if worn else None
     try:
         for name in figures:
             if all(has[need] for need in JOB[name].needs):
-                shown = JOB[name].make(run, twin, units=choice.units)
+                shown = JOB[name].make(run, twin, units=units)
                 shown.figure.layout.title = job_title(studies, key, shown.title)
                 yield shown
     except analysis.NoSeriesError as error:
@@ -146,22 +139,23 @@ def drawable(stored: Stored, studies: Sequence[StoredStudy], key: str) -> xr.Dat
     return stored.job(key)
 
 
-def draw_study(stored: Stored, study: StoredStudy, choice: PlotChoice) -> Iterator[DrawnFigure]:
+def draw_study(
+    stored: Stored, study: StoredStudy, what: Sequence[str], over: str, at: Sequence[str],
+    units: Units,
+) -> Iterator[DrawnFigure]:  # fmt: skip
     """Yield the figures of a study along one axis."""
-    if choice.what and {*choice.what} <= {*JOB}:
+    if what and {*what} <= {*JOB}:
         first = study.keys[0][:KEY_DIGITS]
-        raise PlotError(
-            f"{study.name} is a study: for {choice.what[0]} name a job, such as {first}"
-        )
-    figures = choose_figures(choice.what, [*STUDY], f"study {study.name}")
-    over = choose_axis(stored.folder, study, choice.over)
-    jobs, title, where = select_jobs(stored.folder, study, over, choice.at, MAX_ROWS)
+        raise PlotError(f"{study.name} is a study: for {what[0]} name a job, such as {first}")
+    figures = choose_figures(what, [*STUDY], f"study {study.name}")
+    over = choose_axis(stored.folder, study, over)
+    jobs, title, where = select_jobs(stored.folder, study, over, at, MAX_ROWS)
     rows = [swept_row(stored, value, key) for value, key in jobs]
     if not any(row.shaking for row in rows):
         raise PlotError(nothing_to_draw(stored, study, rows))
     for name in figures:
         kept = keep_sensed(rows) if name == "cycles" else rows
-        shown = STUDY[name].make(kept, title, units=choice.units)
+        shown = STUDY[name].make(kept, title, units=units)
         shown.figure.layout.title = study_title(study, shown.title, where)
         yield shown._replace(note=spell_where(where))
 
