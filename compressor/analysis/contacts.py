@@ -48,17 +48,11 @@ class ContactSeries:
 
 
 def joints_with_clearance(run: "xr.Dataset") -> dict[str, float]:
-    """Return the joints of a run that have clearance, with it, m.
-
-    Raises ValueError where the run has no time series or no joint has clearance.
-    """
+    """Return the joints of a run that have clearance, with it, m. Raises ValueError without series."""
     if "penetration" not in run or "time" not in run.dims:
         raise ValueError("the run has no time series (output.keep: series)")
     clearances = record_of(run)["clearance"]
-    found = {joint: float(c) for joint, c in zip(JOINTS, clearances, strict=True) if c > 0}
-    if not found:
-        raise ValueError("no joint of the run has clearance")
-    return found
+    return {joint: float(c) for joint, c in zip(JOINTS, clearances, strict=True) if c > 0}
 
 
 def contact_series(run: "xr.Dataset", joint: str) -> ContactSeries:
@@ -112,7 +106,7 @@ def impacts(run: "xr.Dataset") -> list[Impact]:
 
     An impact is a contact (F_N > 0) that begins after the journal was off its bore, as in
     `impact_count`; one that lies between two samples is not seen. Raises ValueError for a run
-    without time series or clearance.
+    without time series.
     """
     joints, begin = joints_with_clearance(run), run.attrs["settle"] * (1 - 1e-12)
     found = [one for joint in joints for one in impacts_of(run, contact_series(run, joint))]

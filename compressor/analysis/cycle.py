@@ -148,15 +148,11 @@ def find_events(run: "xr.Dataset", begin: float) -> tuple[tuple[float, str], ...
 
 def find_impacts(run: "xr.Dataset", begin: float) -> dict[str, np.ndarray]:
     """Return the angles (degrees) of the impacts in a revolution by joint with clearance."""
-    try:
-        joints = joints_with_clearance(run)
-    except ValueError:
-        return {}
     found = [
         one for one in impacts(run)
         if begin - 1e-9 < one.revolution - 1 + one.crank_angle / 360.0 < begin + 1
     ]  # fmt: skip
     return {
         joint: np.array([one.crank_angle for one in found if one.joint == joint])
-        for joint in joints
+        for joint in joints_with_clearance(run)
     }

@@ -172,7 +172,8 @@ class MachineNumber:
 
     def value(self) -> str:
         """Return the number with its unit as text: `62.2 kN`, or `40 to 62.2 kN`."""
-        both = dict.fromkeys(map(_format, (self.low, self.high)))
+        ends = (self.low, self.high)
+        both = dict.fromkeys(f"{x:.0f}" if 1e3 <= abs(x) < 1e6 else f"{x:.4g}" for x in ends)
         return f"{' to '.join(both)} {self.unit}".rstrip()
 
 
@@ -445,8 +446,3 @@ def is_own(case: Case, keys: Sequence[str]) -> bool:
     parts = [part for key in keys for part in stands_for(key) or (key,)]
     rows = [row for part in parts if (row := row_of(part))]
     return any(value_of(case, row.key) not in (None, row.default) for row in rows)
-
-
-def _format(value: float) -> str:
-    """Return a number to four digits."""
-    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.4g}"

@@ -18,7 +18,7 @@ def rubbing_work(run: "xr.Dataset") -> np.ndarray:
 
     Archard's wear is in proportion to it. Over the settled revolutions, by the samples of the time
     series; at the default `solve.output_step_deg` within 0.2 % of the dense solution's. Raises
-    ValueError of a run without time series, or without clearance.
+    ValueError of a run without time series.
     """
     p, found = record_of(run), np.zeros(len(JOINTS))
     settled = slice(-settled_part(run).sizes["time"], None)

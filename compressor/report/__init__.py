@@ -2,6 +2,6 @@
 
 from compressor.report.figures import style
 from compressor.report.figures.drawing import Panel, PlotlyFigure, make_grid, midway, rectangle
-from compressor.report.figures.sweep_data import Measure, measures, positions
+from compressor.report.figures.sweep_data import Measure, axis_of, measures
 from compressor.report.plots import title_figure, write_figure, write_plots
 from compressor.report.report import write_report

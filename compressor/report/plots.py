@@ -101,10 +101,7 @@ def job_figures(
     """Yield the figures of a job that has time series."""
     figures = choose_figures(what, [*JOB], f"job {key}")
     run = drawable(stored, studies, key)
-    try:
-        worn = bool(analysis.joints_with_clearance(run))
-    except ValueError:
-        worn = False
+    worn = bool(analysis.joints_with_clearance(run))
     has = {"clearance": worn, "gas": analysis.case_of(run).load == "gas"}
     why = {
         "clearance": "has ideal joints",

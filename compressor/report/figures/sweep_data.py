@@ -111,14 +111,6 @@ def differ_beyond_bars(values: np.ndarray, bars: np.ndarray) -> bool:
     return bool(np.ptp(values.flat[[low, high]]) > np.nansum(bars.flat[[low, high]]))
 
 
-def swept_axes(study: xr.Dataset) -> list[str]:
-    """Return the axes, of a list of jobs the coordinates, that have more than one value."""
-    if study["status"].dims != ("job",):
-        return [str(dim) for dim in study["status"].dims if study.sizes[dim] > 1]
-    columns = (str(n) for n, c in study.coords.items() if c.dims == ("job",) and n != "key")
-    return [name for name in columns if len({*study[name].dropna("job").values.tolist()}) > 1]
-
-
 def swept_values(data: xr.Dataset) -> dict[str, np.ndarray]:
     """Return the swept values of a study's jobs, in the order of its `status`, by coordinate."""
     status = data["status"]
@@ -127,11 +119,6 @@ def swept_values(data: xr.Dataset) -> dict[str, np.ndarray]:
         name: data[name].broadcast_like(status).transpose(*status.dims).values.ravel()
         for name in names
     }
-
-
-def positions(data: xr.Dataset, axis: str) -> np.ndarray:
-    """Return the positions of an axis' values along it, as `PlottedAxis.places`."""
-    return PlottedAxis(axis, "", "", data[axis].values).places
 
 
 def shown_value(value: Any) -> str:
@@ -230,9 +217,16 @@ class PlottedSweep:
 
 
 def sweep_of(data: xr.Dataset) -> PlottedSweep:
-    """Return the sweep of a study, as `open_study` gives it; numbers of a grid are sorted."""
-    names, dims = swept_axes(data), data["status"].dims
-    if dims != ("job",):
+    """Return the sweep of a study, as `open_study` gives it, over what has more than one value.
+
+    Numbers of a grid are sorted.
+    """
+    dims = data["status"].dims
+    if dims == ("job",):
+        columns = (str(n) for n, c in data.coords.items() if c.dims == dims and n != "key")
+        names = [name for name in columns if len({*data[name].dropna("job").values.tolist()}) > 1]
+    else:
+        names = [str(dim) for dim in dims if data.sizes[dim] > 1]
         data = data.isel({dim: 0 for dim in dims if dim not in names})
         falling = [n for n in names if data[n].dtype.kind in "fiu" and (np.diff(data[n]) < 0).any()]
         data = data.isel({name: np.argsort(data[name].values) for name in falling})

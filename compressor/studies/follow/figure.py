@@ -67,7 +67,7 @@ def draw_followed(machine: xr.Dataset, title: str = "") -> report.PlotlyFigure:
     over, known = machine.attrs["over"], machine["section"].notnull()
     known = known.any([dim for dim in known.dims if dim != "joint"])
     joints = [str(joint) for joint in machine["joint"].values[known.values]]
-    x, log = report.positions(machine, over), bool(machine.attrs["log"])
+    x, log = report.axis_of(machine, over).places, bool(machine.attrs["log"])
     ratios = [2.2] * len(joints) + [1.2, 1.4] + [0.8] * len(joints)
     drawing, _ = report.make_grid(
         len(ratios), 1, 1.35 * sum(ratios) + 1.2, heights=ratios, share_x="all"
