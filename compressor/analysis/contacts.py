@@ -48,7 +48,7 @@ class ContactSeries:
 
 
 def joints_with_clearance(run: "xr.Dataset") -> dict[str, float]:
-    """Return the joints of a run that have clearance, with it, m. Raises ValueError without series."""
+    """Return the joints that have clearance, with it (m). Raises ValueError without series."""
     if "penetration" not in run or "time" not in run.dims:
         raise ValueError("the run has no time series (output.keep: series)")
     clearances = record_of(run)["clearance"]

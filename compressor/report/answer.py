@@ -127,19 +127,8 @@ class MetricChange:
     first: bool = False
 
 
-@dataclass(frozen=True)
-class StudyLine:
-    """What was run, under which name, and how it ended."""
-
-    name: str
-    anchor: str
-    counts: str
-    problem: bool
-    has_result: bool = True
-
-
 def answer_section(
-    lines: Sequence[StudyLine], findings: Sequence[tuple[str, Sequence[MetricChange]]],
+    lines: Sequence[SimpleNamespace], findings: Sequence[tuple[str, Sequence[MetricChange]]],
     claims: Sequence[Claim], cautions: Sequence[str],
 ) -> Section:  # fmt: skip
     """Return the section that the page begins with; cautions: a sentence each."""

@@ -29,17 +29,13 @@ EVEN = 1e-3  # of a step: how far evenly spaced numbers may be off
 
 
 def script(name: str, figure: go.Figure) -> str:
-    """Return the script of a figure."""
-    return f"compsimFigure({json.dumps(name)},{to_json_plotly(thin_figure(figure))});\n"
-
-
-def thin_figure(figure: go.Figure) -> dict[str, Any]:
-    """Return a figure in plotly's JSON, with the points that a screen can show.
+    """Return the script of a figure in plotly's JSON, with the points that a screen can show.
 
     Plotly checks again whatever it makes a figure of, so that this is none.
     """
     data = [thin_trace(trace, figure.layout[f"xaxis{trace.xaxis[1:]}"]) for trace in figure.data]
-    return {"data": data, "layout": figure.layout.to_plotly_json()}
+    found = {"data": data, "layout": figure.layout.to_plotly_json()}
+    return f"compsimFigure({json.dumps(name)},{to_json_plotly(found)});\n"
 
 
 def thin_trace(trace: Trace, axis: Any) -> dict[str, Any]:
@@ -115,7 +111,7 @@ def job_scripts(
         except (NoSeriesError, DamagedFile):
             continue  # shorter than a revolution, or its file is damaged: others report it
         found += 1
-        yield key, script(series_name(key), figure)
+        yield key, script(f"job-{key}", figure)
 
 
 def read_shown(stored: Stored, key: str) -> xr.Dataset:
@@ -129,11 +125,6 @@ def read_shown(stored: Stored, key: str) -> xr.Dataset:
         for name, values in stored.values(key, SHOWN).items()
     }
     return xr.Dataset(variables, attrs={"settle": stored.attributes(position)["settle"]})
-
-
-def series_name(key: str) -> str:
-    """Return the name of a job's script."""
-    return f"job-{key}"
 
 
 def draw_job(run: xr.Dataset, units: Units = "usual") -> go.Figure:

@@ -96,18 +96,6 @@ def value_cell(value: Any) -> Cell:
     return Cell(str(value) or "–")
 
 
-def job_row(cells: Sequence[Cell], status: str, regime: str = "", key: str = "") -> TableRow:
-    """Return a job's row, marked where the job failed, is missing, or is chaotic."""
-    chaotic = regime if regime == Regime.CHAOTIC else ""
-    return TableRow(cells, chaotic if status == "ok" else status, key)
-
-
-def status_text(status: object, reason: object, regime: object = "") -> str:
-    """Return how a job ended, in words, and how its motion goes, if it is known."""
-    cause = reason or regime
-    return f"{status}: {cause}" if cause else str(status)
-
-
 def column_title(measure: Measure) -> str:
     """Return the title of a measure's column."""
     return measure.title + (f" ({measure.unit})" if measure.unit else "")
@@ -156,28 +144,6 @@ class Section:
 SUBJECT = "Reciprocating compressor with joint clearance"
 
 
-def templates(files: Mapping[str, bytes]) -> Environment:
-    """Return the page's templates, which escape what they print; files: as of `document`."""
-
-    def address(name: str) -> Markup:
-        """Return where a file is: beside the page, or in it."""
-        if not files:
-            return escape(name)
-        kind = "text/csv" if name.endswith(".csv") else "image/png"
-        return Markup(f"data:{kind};base64,{base64.b64encode(files[name]).decode()}")
-
-    made = Environment(
-        loader=PackageLoader(__package__),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    made.globals |= {"address": address, "single": bool(files)}
-    return made
-
-
 def document(
     sections: Sequence[Section],
     results: str,
@@ -191,9 +157,25 @@ def document(
     beside the page; title: of the page, `SUBJECT` where there is none; files: pictures, tables and
     scripts that the page is to hold, by name, in place of those beside it.
     """
+
+    def address(name: str) -> Markup:
+        """Return where a file is: beside the page, or in it."""
+        if not files:
+            return escape(name)
+        kind = "text/csv" if name.endswith(".csv") else "image/png"
+        return Markup(f"data:{kind};base64,{base64.b64encode(files[name]).decode()}")
+
+    made = Environment(
+        loader=PackageLoader(__package__),
+        autoescape=True,  # of all that templates print
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    made.globals |= {"address": address, "single": bool(files)}
     scripts = [Markup(text.decode()) for name, text in files.items() if name.endswith("js")]
-    page = templates(files).get_template("page.html")
-    return page.render(
+    return made.get_template("page.html").render(
         sections=sections, results=results, series=series, title=title, subject=SUBJECT,
         scripts=scripts,
     )  # fmt: skip

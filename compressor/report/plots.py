@@ -21,7 +21,7 @@ from compressor.report.figures.drawing import as_csv, thin_places
 from compressor.report.figures.pictures import render
 from compressor.report.figures.sweep_data import name_in_words, shown_value
 from compressor.report.figures.table import DrawnFigure
-from compressor.report.study_section import file_name
+from compressor.report.study_section import KEY_DIGITS, file_name
 from compressor.store import Stored, StoredStudy
 from compressor.units import Units
 
@@ -57,7 +57,6 @@ JOINT_WORDS = {
 }  # fmt: skip
 TITLE_WIDTH = 105  # letters of a line of a figure's title
 MAX_ROWS = 200  # of a map
-KEY_DIGITS = 10  # digits of a key in the name of a file
 KEEP = "run it again with --set output.keep=series"
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import chain
 from pathlib import Path
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import xarray as xr
@@ -53,7 +54,7 @@ def write_report(
     """
     folder, zones = Path(report), read_limits(limits, units)
     figures, series, make_page = build_report(results, command, zones, units, studies)
-    files = {f"{interactive.series_name(key)}.js": text.encode() for key, text in series.items()}
+    files = {f"job-{key}.js": text.encode() for key, text in series.items()}
     drawn = [one for one in figures if isinstance(one, DrawnFigure)]
     shown = [one for one in figures if isinstance(one, page.ShownFigure)]
     for made in [*shown, *draw_all([partial(page.show_figure, one) for one in drawn])]:
@@ -160,7 +161,7 @@ class DrawnStudy(NamedTuple):
     section: page.Section
     table: page.Section
     findings: list[answer.MetricChange]
-    line: answer.StudyLine
+    line: SimpleNamespace
     keys: list[str]
     cautions: list[str]
     shown: set[str]
@@ -199,10 +200,11 @@ def drawn_study(
         )  # fmt: skip
 
 
-def describe_run(name: str, anchor: str, data: xr.Dataset) -> answer.StudyLine:
-    """Return what was run, and how it ended; anchor: of its section."""
-    words, found = study_section.count_jobs(data)
-    return answer.StudyLine(name, anchor, words, found["failed"] > 0, found["ok"] > 0)
+def describe_run(name: str, anchor: str, data: xr.Dataset) -> SimpleNamespace:
+    """Return what was run, under which name, and how it ended; anchor: of its section."""
+    counts, found = study_section.count_jobs(data)
+    return SimpleNamespace(name=name, anchor=anchor, counts=counts, problem=found["failed"] > 0,
+                           has_result=found["ok"] > 0)  # fmt: skip
 
 
 def motion_cautions(stored: Stored, study: StoredStudy, data: xr.Dataset) -> list[str]:

@@ -1,7 +1,5 @@
 """A study's machine without clearance beside its worn jobs, as numbers."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import xarray as xr
 
@@ -21,17 +19,9 @@ CLEARANCES = {"clearance_mm", *stands_for("clearance_mm")}
 FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its meaning
 
 
-@dataclass(frozen=True)
-class HealthyAndWorn:
-    """The table of a machine without clearance and of its worn jobs, and what it says."""
-
-    words: str
-    table: page.PageTable
-
-
 def compare_healthy(
     stored: Stored, data: xr.Dataset, units: Units = "usual"
-) -> HealthyAndWorn | None:
+) -> page.SectionContent | None:
     """Return the worn job of the greatest contact force beside its machine without clearance.
 
     And jobs of the study that differ from it in clearances alone, by clearance. None where no job
@@ -43,7 +33,7 @@ def compare_healthy(
     is_worn = abs(data["max_penetration"]) > 0.0  # exactly 0 in an ideal joint
     has_clearance = (is_worn.any("joint") & (data["status"] == "ok")).values.ravel()
     force = np.full(has_clearance.size, np.nan)
-    for measure in measures_of(FORCE, data):
+    for measure in (one for one in MEASURES if one.variable == FORCE and FORCE in data):
         worn = is_worn.sel(joint=measure.joint).values.ravel()
         known = measure.known(measure.of(data), measure.bar(data)).ravel()
         force = np.fmax(force, np.where(worn, known, np.nan))
@@ -67,11 +57,6 @@ def compare_healthy(
     return _compare(data, case, places, words, units)
 
 
-def measures_of(name: str, data: xr.Dataset) -> list[Measure]:
-    """Return the measures of a metric, of each joint or axis; none where the data have it not."""
-    return [one for one in MEASURES if one.variable == name and name in data]
-
-
 def differing_in_clearance(data: xr.Dataset, place: int) -> list[int]:
     """Return the jobs of a study that differ from one in clearances alone, from the least on."""
     alike = np.ones(data["status"].size, bool)
@@ -88,7 +73,7 @@ def differing_in_clearance(data: xr.Dataset, place: int) -> list[int]:
 
 def _compare(
     data: xr.Dataset, case: Case, places: list[int], beside: str, units: Units
-) -> HealthyAndWorn | None:
+) -> page.SectionContent | None:
     """Return the table: a row a metric, a column without clearance and one a job.
 
     beside: which jobs these are, in words.
@@ -122,7 +107,8 @@ def _compare(
             " Ideal joints pass on each kink of the load, which oil and clearance soften: a sensor "
             "may read more without clearance than with a little."
         )
-    return HealthyAndWorn(words, page.PageTable(["metric", "without clearance", *heads], rows))
+    table = page.PageTable(["metric", "without clearance", *heads], rows)
+    return page.SectionContent(table, [words])
 
 
 def _cell(measure: Measure, value: float, bar: float, sound: float) -> page.Cell:

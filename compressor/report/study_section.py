@@ -106,12 +106,13 @@ def jobs_table(
     rows = []
     for place, (status, reason, regime, key) in zip(range(MAX_ROWS), ends, strict=False):
         cells = [page.value_cell(values[place]) for values in swept.values()]
-        cells.append(page.Cell(page.status_text(status, reason, regime)))
+        cells.append(page.Cell(f"{status}: {reason or regime}".removesuffix(": ")))
         cells += [
             page.measured_cell(m, float(of[place]), float(bar[place]), limits)
             for m, of, bar in metrics
         ]
         cells.append(page.Cell(str(key)[:KEY_DIGITS], "code"))
-        rows.append(page.job_row(cells, str(status), str(regime), str(key)))
+        mark = "" if regime != Regime.CHAOTIC else str(regime)
+        rows.append(page.TableRow(cells, mark if status == "ok" else str(status), str(key)))
     head = [*swept, "status", *map(page.column_title, shown), "job"]
     return page.PageTable(head, rows)

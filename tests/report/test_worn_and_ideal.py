@@ -41,7 +41,7 @@ def shown(found):
 def test_the_column_without_clearance_is_the_closed_form(swept, study):
     found = compare_healthy(*study)
     assert shown(found) == sorted(CLEARANCES)
-    assert "Beside it all jobs that differ in clearances alone" in found.words
+    assert "Beside it all jobs that differ in clearances alone" in found.paragraphs[0]
     numbers = {row.cells[0].text: row.cells for row in found.table.rows}
     case = Case.from_values({})
     lengths = (case.machine.crank_radius_mm / 1e3, case.machine.rod_length_mm / 1e3)
@@ -67,15 +67,15 @@ def test_the_worst_job_stands_there_in_the_order_of_clearance(study, worst, monk
     assert columns == sorted(columns)
     assert len(columns) in (5, 6)
     assert {min(CLEARANCES), max(CLEARANCES), worst} <= {*columns}
-    assert f"the greatest contact force in a worn joint is at clearance {worst:g} mm" in found.words
-    assert f"Beside it {len(columns)} of 8 jobs that" in found.words
+    assert f"the greatest contact force in a worn joint is at clearance {worst:g} mm" in found.paragraphs[0]
+    assert f"Beside it {len(columns)} of 8 jobs that" in found.paragraphs[0]
 
 
 def test_a_peak_that_is_not_known_makes_no_job_the_worst(study):
     stored, data = study[0], study[1].copy()
     data["peak_contact_force_error"] = data["peak_contact_force"] * 0.0 + np.inf
     found = compare_healthy(stored, data)
-    assert "contact force" not in found.words
+    assert "contact force" not in found.paragraphs[0]
     assert len(shown(found)) == len(CLEARANCES)
 
 
@@ -94,7 +94,7 @@ def test_a_job_by_itself_and_one_without_clearance(study):
     stored, data = study
     one = compare_healthy(stored, data.isel(clearance_mm=[0]))
     assert one.table.head == ["metric", "without clearance", "this job"]
-    assert "Beside it this job." in one.words
+    assert "Beside it this job." in one.paragraphs[0]
     assert compare_healthy(stored, data.assign(max_penetration=data["max_penetration"] * 0)) is None
 
 

@@ -9,7 +9,6 @@ import csv
 import io
 import itertools
 import math
-import re
 from collections.abc import Sequence
 from typing import Any, Literal, TypeAlias
 
@@ -440,16 +439,11 @@ def points(trace: Trace) -> tuple[np.ndarray, np.ndarray, *tuple[tuple[str, np.n
     return x, y, ("below", error.arrayminus), ("above", error.array)
 
 
-NUMERAL = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
-
-
 def name_places(values: np.ndarray, axis: Axis, rows: Sequence[str] | None = None) -> list[str]:
     """Return places along an axis as text: the names of its rows, or words at its ticks."""
-    named = dict(enumerate(rows or ())) or {
-        place: one_line(word)
-        for place, word in (zip(axis.tickvals, axis.ticktext, strict=True) if axis.ticktext else ())
-        if not (NUMERAL.fullmatch(word) and math.isclose(float(word), place, rel_tol=1e-3))
-    }
+    named = dict(enumerate(rows or ()))
+    if axis.ticktext and not named:
+        named = dict(zip(axis.tickvals, map(one_line, axis.ticktext), strict=True))
     both = zip(values.tolist(), texts(values), strict=True)
     return [named.get(value, text) for value, text in both]
 

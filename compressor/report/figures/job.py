@@ -371,7 +371,8 @@ def plot_orbit(panel: Panel, degrees: np.ndarray, place: np.ndarray, clearance: 
     panel.plot(place[:, 0], place[:, 1], PATH, "path of the journal's centre")
     for angle, (name, shape) in CORNERS.items():
         nearest = np.argmin(np.abs((degrees - angle + 180) % 360 - 180))
-        panel.plot(*place[nearest], style.mark(style.GOLD, shape, 7, 4, edge=style.BLACK), name)
+        x, y = place[nearest]
+        panel.plot(x, y, style.mark(style.GOLD, shape, 7, 4, edge=style.BLACK), name)
     room = 1.08 * max(clearance, np.linalg.norm(place, axis=1).max())
     panel.y.scaleanchor = f"x{panel.suffix}"
     for way in WAYS:
