@@ -15,12 +15,10 @@ from compressor.report.figures.drawing import thin_places
 from compressor.report.figures.style import RED, mark
 from compressor.units import Units, unit_in
 
-MARKS = {
-    "failed": mark(RED, "x-thin", 7, 4, edge_width=1.8),
-    "missing": mark("#606060", "circle", 6, 4, is_hollow=True),
+MARKS = {  # of jobs without a result: how they look, their name, their height in a panel
+    "failed": (mark(RED, "x-thin", 7, 4, edge_width=1.8), "a job failed here", 0.04),
+    "missing": (mark("#606060", "circle", 6, 4, is_hollow=True), "a job was not run", 0.11),
 }
-NAMES = {"failed": "a job failed here", "missing": "a job was not run"}
-FOOT = {"failed": 0.04, "missing": 0.11}  # height in a panel
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from compressor.report.figures import style, sweep_panels
 from compressor.report.figures.drawing import Panel, Way, make_grid
 from compressor.report.figures.sweep_data import (
     MARKS,
-    NAMES,
     Measure,
     PlottedAxis,
     PlottedSweep,
@@ -34,7 +33,7 @@ def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> go.Figure:
     table = PlottedSweep(sweep.data.transpose(y.name, x.name, ...), (x, y))
     table = coarse(coarse(table, 0, MAX_CELLS), 1, MAX_CELLS)
     x, y = table.axes
-    marks = [(table.status == word, mark, NAMES[word]) for word, mark in MARKS.items()]
+    marks = [(table.status == word, mark, name) for word, (mark, name, _) in MARKS.items()]
     ring = replace(sweep_panels.RING, markersize=6.0)
     marks.append((table.chaotic, ring, sweep_panels.CHAOTIC))
     drawing = sweep_panels.metric_panels(measures, 2.6, "all", "all")

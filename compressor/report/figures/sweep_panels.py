@@ -13,9 +13,7 @@ from numpy.typing import ArrayLike
 from compressor.report.figures import style
 from compressor.report.figures.drawing import Drawing, Panel, make_grid, thin_places
 from compressor.report.figures.sweep_data import (
-    FOOT,
     MARKS,
-    NAMES,
     Measure,
     PlottedAxis,
     PlottedSweep,
@@ -88,12 +86,12 @@ def mark_points(
 def mark_feet(panel: Panel, x: np.ndarray, status: np.ndarray, keys: np.ndarray) -> None:
     """Draw marks at the foot of a panel where jobs failed or were not run; all of one shape."""
     low, high = panel.y.range
-    for word, look in MARKS.items():
+    for word, (look, name, height) in MARKS.items():
         here = status == word
-        foot = low + FOOT[word] * (high - low)
+        foot = low + height * (high - low)
         foot = (10.0**foot if panel.y.type == "log" else foot) / panel.factors["y"]
         feet = np.full(here.sum(), foot)
-        mark_points(panel, x[here], feet, keys[here], look, NAMES[word])
+        mark_points(panel, x[here], feet, keys[here], look, name)
 
 
 def scale_x(panel: Panel, axis: PlottedAxis) -> None:
