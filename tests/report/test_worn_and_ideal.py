@@ -67,7 +67,8 @@ def test_the_worst_job_stands_there_in_the_order_of_clearance(study, worst, monk
     assert columns == sorted(columns)
     assert len(columns) in (5, 6)
     assert {min(CLEARANCES), max(CLEARANCES), worst} <= {*columns}
-    assert f"the greatest contact force in a worn joint is at clearance {worst:g} mm" in found.paragraphs[0]
+    told = f"the greatest contact force in a worn joint is at clearance {worst:g} mm"
+    assert told in found.paragraphs[0]
     assert f"Beside it {len(columns)} of 8 jobs that" in found.paragraphs[0]
 
 

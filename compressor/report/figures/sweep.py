@@ -71,7 +71,7 @@ def draw_sweep(
             "is long enough to be seen."
         )
         return [DrawnFigure(
-            sweep_panels.draw_curves(sweep, shown, limits), sentence,
+            sweep_panels.draw_lines(sweep, [0], shown, limits), sentence,
             [*count_drawn(axis, sweep_panels.MAX_JOBS), *about],
             zone_words(shown, limits), axis.name, f"metrics against {axis.phrase}",
         )]  # fmt: skip
@@ -108,7 +108,7 @@ def draw_grid(
     )
     cut = [*count_drawn(x, sweep_panels.MAX_PLACES), *count_drawn(color, sweep_panels.MAX_LINES)]
     yield DrawnFigure(
-        sweep_panels.draw_overview(sweep, chosen, shown), sentence, [*cut, *about],
+        sweep_panels.draw_lines(sweep, chosen, shown), sentence, [*cut, *about],
         " What is not known within its error bar is no part of a mean." * bool(others),
         "overview", f"metrics over {x.phrase} and {color.phrase}",
     )  # fmt: skip

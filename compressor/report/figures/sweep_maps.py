@@ -20,12 +20,11 @@ from compressor.report.figures.sweep_data import (
     spans_decades,
 )
 
-COLORS = "cividis"
 MAX_CELLS = 64  # along an axis
 
 
 def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> go.Figure:
-    """Return a map of every measure over both axes of a grid, a cell a job.
+    """Return a map of every measure over both axes of a grid, a cell a job; noise is no pattern.
 
     At most MAX_CELLS along an axis; the axis of fewer values lies along y.
     """
@@ -39,7 +38,14 @@ def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> go.Figure:
     drawing = sweep_panels.metric_panels(measures, 2.6, "all", "all")
     for panel, measure in zip(drawing.panels, measures, strict=True):
         panel.label("y", "")  # the colours have the unit
-        plot_map(panel, table, measure)
+        panel.x.showgrid = panel.y.showgrid = False
+        cells, bars = measure.of(table.data), measure.bar(table.data)
+        values, is_log = cells[np.isfinite(cells)], spans_decades(cells)
+        ends = (values.min(), values.max()) if is_log else sweep_panels.span_around(values, bars)
+        panel.map(
+            x.places, y.places, cells, style.palette("cividis"), ends, "{}", measure.unit, is_log,
+            measure.title, sweep_panels.job_keys(table.keys),
+        )  # fmt: skip
         for here, mark, name in marks:
             rows, columns = np.nonzero(here)
             places = x.places[columns], y.places[rows]
@@ -48,20 +54,6 @@ def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> go.Figure:
         scale_map(panel, "y", y, y.words)
         panel.x.title, panel.y.title = x.title, y.title
     return drawing.figure()
-
-
-def plot_map(panel: Panel, table: PlottedSweep, measure: Measure) -> None:
-    """Draw a measure's cells with their colour scale, on which noise is no pattern."""
-    panel.x.showgrid = panel.y.showgrid = False
-    x, y = table.axes
-    cells = measure.of(table.data)
-    values, is_log = cells[np.isfinite(cells)], spans_decades(cells)
-    bars = measure.bar(table.data)
-    ends = (values.min(), values.max()) if is_log else sweep_panels.span_around(values, bars)
-    panel.map(
-        x.places, y.places, cells, style.palette(COLORS), ends, "{}", measure.unit, is_log,
-        measure.title, sweep_panels.job_keys(table.keys),
-    )  # fmt: skip
 
 
 def scale_map(panel: Panel, way: Way, axis: PlottedAxis, words: Sequence[str]) -> None:

@@ -176,27 +176,6 @@ PLAIN_LINE = style.LineStyle(style.BLUE, (), 1.4, marker="circle", markersize=3.
 MAX_JOBS = 1000
 
 
-def draw_curves(
-    sweep: PlottedSweep, measures: Sequence[Measure], limits: Limits = NO_LIMITS
-) -> go.Figure:
-    """Return every measure over the one axis of a grid, a point a job; over words without a line.
-
-    Of more than MAX_JOBS jobs as many are drawn. limits: of measures, which are lines.
-    """
-    sweep = coarse(sweep, 0, MAX_JOBS)
-    (axis,) = sweep.axes
-    drawing = metric_panels(measures, 2.35, "all")
-    line = replace(PLAIN_LINE, linewidth=0.0) if axis.is_words else PLAIN_LINE
-    for panel, measure in zip(drawing.panels, measures, strict=True):
-        scale_x(panel, axis)
-        span = scale_y(panel, measure.of(sweep.data), measure.bar(sweep.data))
-        plot_jobs(panel, sweep, measure, measure.title, line, span, listed=False)
-        mark_feet(panel, axis.places, sweep.status, sweep.keys)
-        for limit in limits.of(measure):
-            panel.rule(LIMIT, y=limit)
-    return drawing.figure()
-
-
 MAX_PLACES = 200  # in x
 
 
@@ -211,34 +190,42 @@ def choose_axes(sweep: PlottedSweep, order: Sequence[int]) -> tuple[int, int]:
     return x, next(n for n in order if n != x)
 
 
-def draw_overview(
-    sweep: PlottedSweep, chosen: tuple[int, int], measures: Sequence[Measure]
+def draw_lines(
+    sweep: PlottedSweep,
+    chosen: Sequence[int],
+    measures: Sequence[Measure],
+    limits: Limits = NO_LIMITS,
 ) -> go.Figure:
-    """Return every measure over two axes, as lines; means over the others, if there are any.
+    """Return every measure over the first of some axes of a grid, a line a value of the second.
 
-    chosen: of `choose_axes`. What is not known within its error bar is no part of a mean.
+    Points are jobs, without a line over words; of three axes or more means over the others, of what
+    is known within its error bar. limits: of measures, which are lines.
     """
-    sweep = coarse(sweep, chosen[0], MAX_PLACES)
-    axis, color = (sweep.axes[n] for n in chosen)
-    lines = lines_for(color, axis.is_words)
+    count = len(sweep.axes)
+    sweep = coarse(sweep, chosen[0], MAX_JOBS if count == 1 else MAX_PLACES)
+    axis, *others = (sweep.axes[n] for n in chosen)
+    alone = {0: replace(PLAIN_LINE, linewidth=0.0) if axis.is_words else PLAIN_LINE}
+    lines = lines_for(others[0], axis.is_words) if others else alone
+    names = [others[0].value_text(n) if others else "" for n in lines]
+    parts = [sweep.at(chosen[1], n) if others else sweep for n in lines]
     drawing = metric_panels(measures, 2.35, "all")
-    parts = {n: sweep.at(chosen[1], n) for n in lines} if len(sweep.axes) == 2 else {}
     for panel, measure in zip(drawing.panels, measures, strict=True):
         scale_x(panel, axis)
-        if not parts:
+        if count > 2:
             known = xr.DataArray(sweep.known(measure), dims=[one.name for one in sweep.axes])
-            others = [dim for dim in known.dims if dim not in (axis.name, color.name)]
-            means = known.isel({color.name: [*lines]}).mean(others)  # nan where nothing is known
-            scale_y(panel, means.values)
-            for row, (n, line) in enumerate(lines.items()):
-                values = means.isel({color.name: row}).values
-                panel.plot(axis.places, values, line, color.value_text(n))
+            means = known.mean([d for d in known.dims if d not in (axis.name, others[0].name)])
+            rows = [means.isel({others[0].name: n}).values for n in lines]
+            scale_y(panel, np.array(rows))
+            for row, line, name in zip(rows, lines.values(), names, strict=True):
+                panel.plot(axis.places, row, line, name)
             continue
         span = scale_y(panel, measure.of(sweep.data), measure.bar(sweep.data))
-        for n, part in parts.items():
-            plot_jobs(panel, part, measure, color.value_text(n), lines[n], span)
-        for part in parts.values():
+        for part, line, name in zip(parts, lines.values(), names, strict=True):
+            plot_jobs(panel, part, measure, name or measure.title, line, span, bool(name))
+        for part in parts:
             mark_feet(panel, axis.places, part.status, part.keys)
+        for limit in limits.of(measure):
+            panel.rule(LIMIT, y=limit)
     return drawing.figure()
 
 
@@ -252,8 +239,23 @@ def draw_points(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Mea
     axes: their numbers, one a measure.
     """
     drawing = metric_panels(measures, 2.35)
+    phrase, words, group = grouping(sweep)
+    lines = lines_of(len(words), False)
     for panel, axis, measure in zip(drawing.panels, axes, measures, strict=True):
-        plot_points(panel, sweep, axis, measure)
+        x, y, keys = sweep.axes[axis].places, measure.of(sweep.data), sweep.keys
+        scale_x(panel, sweep.axes[axis])
+        scale_y(panel, y, measure.bar(sweep.data))
+        shown = np.zeros(y.size, bool)
+        shown[thin_places(y.size, MAX_POINTS)] = True
+        alpha = 0.55 if y.size < 500 else 0.35
+        for n, (word, line) in enumerate(zip(words, lines, strict=True)):
+            name = name_value(phrase, word) if phrase else "a job"
+            here, shape = shown & (group == n), MARKERS[n % len(MARKERS)]
+            dots = style.mark(line.color, shape, POINT, edge_width=0.0, alpha=alpha)
+            mark_points(panel, x[here], y[here], keys[here], dots, name)
+        ring = shown & sweep.chaotic
+        mark_points(panel, x[ring], y[ring], keys[ring], ring_around(POINT), CHAOTIC)
+        mark_feet(panel, x[shown], sweep.status[shown], keys[shown])
     return drawing.figure()
 
 
@@ -266,23 +268,3 @@ def grouping(sweep: PlottedSweep) -> tuple[str, list[Any], np.ndarray]:
         if axis.is_words and len(axis.words) <= MAX_LINES:
             return axis.phrase, axis.words, axis.places.astype(int)
     return "", [""], np.zeros(sweep.status.shape, int)
-
-
-def plot_points(panel: Panel, sweep: PlottedSweep, axis: int, measure: Measure) -> None:
-    """Draw the jobs over one axis, in the colours of their groups."""
-    one = sweep.axes[axis]
-    x, y, keys = one.places, measure.of(sweep.data), sweep.keys
-    scale_x(panel, one)
-    scale_y(panel, y, measure.bar(sweep.data))
-    phrase, words, group = grouping(sweep)
-    shown = np.zeros(y.size, bool)
-    shown[thin_places(y.size, MAX_POINTS)] = True
-    for n, (word, line) in enumerate(zip(words, lines_of(len(words), False), strict=True)):
-        name = name_value(phrase, word) if phrase else "a job"
-        here = shown & (group == n)
-        alpha = 0.55 if y.size < 500 else 0.35
-        dots = style.mark(line.color, MARKERS[n % len(MARKERS)], POINT, edge_width=0.0, alpha=alpha)
-        mark_points(panel, x[here], y[here], keys[here], dots, name)
-    ring = shown & sweep.chaotic
-    mark_points(panel, x[ring], y[ring], keys[ring], ring_around(POINT), CHAOTIC)
-    mark_feet(panel, x[shown], sweep.status[shown], keys[shown])
