@@ -7,9 +7,9 @@ error bars, and a change that moves numbers further is a new version, and so mak
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Mapping, Set
 from dataclasses import field, replace
-from functools import cache, cached_property, lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import yaml
@@ -24,15 +24,7 @@ from compressor.cases.checks import (
     stands_for,
     values_given,
 )
-from compressor.cases.comparison import condition
-from compressor.cases.conflicts import (
-    FACT_KEYS,
-    RULES,
-    conditions,
-    given_conflicts,
-    reads,
-    unread_values,
-)
+from compressor.cases.conflicts import FACT_KEYS, RULES, given_conflicts, reads, unread_values
 from compressor.cases.groups import Contact, Friction, Gas, Machine, Offset, Output, Solve, Spring
 from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS
 from compressor.cases.optional_groups import (
@@ -68,8 +60,6 @@ MAX_GROUPS = 4096  # whose identities are remembered
 SOUND = PerJoint(0.0, 0.0)  # a healthy clearance that no case need name
 FOLLOWING = ("gas.switching", "gas.back_pressure_MPa")  # from what else is given of a cylinder
 OWN_GAS = {key for key in (*table(), *parts_by_key()) if key.startswith("gas.")} - {*FOLLOWING}
-# what facts are read with: tests by their texts, of which many are the same
-FACT_TESTS = {needed: condition(needed) for key in FACT_KEYS for _, needed in conditions(key)}
 IN_KEY_IF_READ = {".".join(key.split(".")[:2]) for key in FACT_KEYS}
 # values that a job's key does not have, as it has none of what is not given
 AS_WITHOUT = {
@@ -467,41 +457,38 @@ def has_own_cylinder(values: Mapping[str, Any], given: Set[str]) -> bool:
     )
 
 
-def identity_of(case: Case) -> dict[str, str]:
-    """Return what makes a case's results, of which its key is the hash: JSON texts by name."""
+def identity_of(case: Case) -> dict[str, Any]:
+    """Return what makes a case's results, of which its key is the hash, by name."""
     solve = case.solve
     # what is integrated and from where on it counts, however it is written
     duration: float | str = case.duration if solve.duration_rev != "auto" else "auto"
     settle: float | str = case.settle if solve.settle_rev != "auto" else "auto"
-    span = (duration, settle, round(case.steps))
+    accuracy = solve.rtol or dict(case.targets) or solve.accuracy
     found = {
-        **_texts_of_choices(case.joint, case.load, solve),
-        "span": KEY_TEXT.encode(span),
-        "facts": KEY_TEXT.encode(_facts_read(case)),
+        "joint": case.joint,
+        "load": case.load,
+        "model": MODEL_VERSION,
+        "solver": (accuracy, solve.method, solve.max_steps),
+        "span": (duration, settle, round(case.steps)),
+        "facts": {
+            key: value
+            for key in FACT_KEYS
+            if (value := getter(key)(case)) not in (None, AS_WITHOUT.get(key)) and reads(case, key)
+        },
     }
     if case.joint != "none":
-        found["clearance_mm"] = _text_of_group("clearance_mm", case.clearance_mm)
+        found["clearance_mm"] = vars(case.clearance_mm)
     for name in IDENTITY_GROUPS:
         group = getattr(case, name)
         if group is not None or not WORDS[name]:
-            found[name] = _text_of_group(name, group)
+            found[name] = _choices_of(name, group)
     return found
 
 
-@lru_cache(MAX_GROUPS)
-def _texts_of_choices(joint: str, load: str, solve: Solve) -> dict[str, str]:
-    """Return the model, joint, load and solver of a case as JSON texts by name."""
-    targets = {} if isinstance(solve.accuracy, str) else dict(solve.accuracy)
-    solver = (solve.rtol or targets or solve.accuracy, solve.method, solve.max_steps)
-    values = {"joint": joint, "load": load, "model": MODEL_VERSION, "solver": solver}
-    return {name: KEY_TEXT.encode(value) for name, value in values.items()}
-
-
-@lru_cache(MAX_GROUPS)  # values that are equal are of one type: pydantic sees to it
-def _text_of_group(name: str, group: Any) -> str:
+def _choices_of(name: str, group: Any) -> Any:
     """Return what a group gives, without facts: those that are read are a part of their own."""
     if group is None:
-        return "false"
+        return False
     given = {
         key: vars(value) if isinstance(value, BY_PART) else value
         for key, value in vars(group).items()
@@ -510,25 +497,7 @@ def _text_of_group(name: str, group: Any) -> str:
     }
     if cards := given.get("indicator"):  # the digest counts, wherever the file is
         given["indicator"] = {end: card and card.rpartition("@")[2] for end, card in cards.items()}
-    return KEY_TEXT.encode(given)
-
-
-def _facts_read(case: Case) -> dict[str, Any]:
-    """Return the facts that a case has and reads."""
-    holds = tuple([test(case) for test in FACT_TESTS.values()])
-    found = {key: get(case) for key, get in _facts_where(holds)}
-    return {key: value for key, value in found.items() if value not in (None, AS_WITHOUT.get(key))}
-
-
-@cache
-def _facts_where(holds: tuple[bool, ...]) -> list[tuple[str, Callable[[Any], Any]]]:
-    """Return the facts that are read where these conditions hold, and how a case gives each."""
-    found = dict(zip(FACT_TESTS, holds, strict=True))
-    return [
-        (key, getter(key))
-        for key in FACT_KEYS
-        if all(found[needed] for _, needed in conditions(key))
-    ]
+    return given
 
 
 def _plain_parts(value: Any) -> Any:
@@ -558,10 +527,9 @@ def _plain_value(group: Any) -> dict[str, Any] | bool:
     return plain
 
 
-def digest(identity: Mapping[str, str]) -> str:
+def digest(identity: Mapping[str, Any]) -> str:
     """Return the hash of an identity, as one JSON text: 20 hexadecimal digits."""
-    text = ",".join(f'"{name}":{identity[name]}' for name in sorted(identity))
-    return hashlib.sha256(f"{{{text}}}".encode()).hexdigest()[:20]
+    return hashlib.sha256(KEY_TEXT.encode(identity).encode()).hexdigest()[:20]
 
 
 def with_ideal_joints(case: Case, features: bool = True) -> Case:
