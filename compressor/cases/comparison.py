@@ -14,7 +14,7 @@ import contextlib
 import operator
 import re
 from collections.abc import Callable
-from functools import lru_cache, reduce
+from functools import lru_cache
 from typing import Any
 
 from compressor.cases.checks import getter, row_of, suggestion
@@ -32,6 +32,7 @@ SIGNS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
     ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le,
     ast.Gt: operator.gt, ast.GtE: operator.ge,
 }  # fmt: skip
+EQUAL = (operator.eq, operator.ne)
 SUCH_AS = "write such as clearance_mm > 0.2 and load == gas"
 
 Value = Callable[[str], Any]  # a key -> a job's value, or None
@@ -82,20 +83,13 @@ def _tree(text: Any) -> ast.expr:
 def _test(node: ast.expr, compare: Callable[[ast.expr], Callable[[Any], bool]]) -> Any:
     """Return the test that a node means; compare: the function that makes that of a comparison."""
     if isinstance(node, ast.BoolOp):
-        join = _both if isinstance(node.op, ast.And) else _either
-        return reduce(join, [_test(part, compare) for part in node.values])
+        join = all if isinstance(node.op, ast.And) else any
+        tests = [_test(part, compare) for part in node.values]
+        return lambda subject: join(test(subject) for test in tests)
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
         inner = _test(node.operand, compare)
         return lambda subject: not inner(subject)
     return compare(node)
-
-
-def _both(first: Callable[[Any], bool], second: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    return lambda subject: first(subject) and second(subject)
-
-
-def _either(first: Callable[[Any], bool], second: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    return lambda subject: first(subject) or second(subject)
 
 
 def _parts(node: Any) -> tuple[str, Any, str]:
@@ -117,18 +111,14 @@ def _compare_job(key: str, sign: Any, text: str) -> Test:
         raise NoComparison(f"unknown key {quote_value(key)}{suggestion(key, '')}")
     if row.kind in ("materials", "text", "card"):
         raise NoComparison(f"{key} cannot be compared")
-    if not row.is_number and sign not in (operator.eq, operator.ne):
-        raise NoComparison(f"{key} is a word: compare it by == or !=")
     wanted = row.choice_of(wanted)
     if wanted not in row.choices and (
         type(wanted) not in (int, float) if row.is_number else row.check(wanted)
     ):
         raise NoComparison(f"{key} needs {'a number' if row.is_number else row.needed}, not {text}")
-    if isinstance(wanted, str) and sign not in (operator.eq, operator.ne):
-        raise NoComparison(f"{wanted} is a word: compare it by == or !=")
-    if sign in (operator.eq, operator.ne) and not isinstance(wanted, str) and row.is_number:
-        printed = setting(wanted)
-        return lambda value: bool(sign(print_number(value(key)), printed))
+    word = wanted if row.is_number else key
+    if isinstance(word, str) and sign not in EQUAL:
+        raise NoComparison(f"{word} is a word: compare it by == or !=")
     return _compare(lambda value: value(key), sign, wanted)
 
 
@@ -139,8 +129,9 @@ def print_number(value: Any) -> Any:
 
 def _compare(get: Callable[[Any], Any], sign: Any, wanted: Any) -> Callable[[Any], bool]:
     """Return the test of one value; a word, or no value, is neither more nor less than a number."""
-    if sign in (operator.eq, operator.ne):
-        return lambda subject: bool(sign(get(subject), wanted))
+    if sign in EQUAL:
+        printed = print_number(wanted)
+        return lambda subject: bool(sign(print_number(get(subject)), printed))
 
     def test(subject: Any) -> bool:
         found = get(subject)
