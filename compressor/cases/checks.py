@@ -9,7 +9,7 @@ import dataclasses
 import math
 import operator
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from difflib import get_close_matches
 from functools import cache, lru_cache
 from typing import Any
@@ -133,7 +133,6 @@ BACK_AND_FORTH = re.compile(
     r"(\w*_)?(piston|crosshead|plunger|reciprocating|wrist_?pin|gudgeon_?pin)(_\w*)?_mass(_[a-z]+)?"
 )
 WEIGHT = re.compile("(?<!counter)(?<!counter_)(?<!balance_)weight")  # a mass, in kg
-PERCENT = re.compile(r"(\w*_)?clearance(_\w*)?_(percent|pct)")
 TWICE = "stands in place of {}: give one of the two"
 
 
@@ -179,12 +178,10 @@ def in_our_unit(name: str, value: Any, allowed: list[str]) -> str:
 
 
 def of_other_quantity(name: str, group: str, value: Any) -> str:
-    """Return the hint at a diameter, a part of a mass, or a clearance in per cent; "" for none."""
+    """Return the hint at a diameter, or a part of a mass; "" for none."""
     is_near = group in ("", "machine", "gas")
     if BACK_AND_FORTH.fullmatch(name) and is_near:
         return "; write machine.reciprocating_mass_kg, of piston, its rod and crosshead together"
-    if PERCENT.fullmatch(name) and is_near:
-        return "; write gas.clearance_percent, a number or {head: 12, crank: 14}"
     for words, form in DIAMETERS if DIAMETER.fullmatch(name) else ():
         if re.search(words, name) and (is_near or "pin_radius" in form):
             ours, factor = OTHER_UNITS.get(name.rpartition("_")[2], ("mm", 1.0))
@@ -206,7 +203,6 @@ def _spell_scaled(value: Any, factor: float) -> str:
 # keys of a case file that are no part of a case: how values are swept together, what the page of
 # the report says of the machine
 SWEEP = ("sample", "zip", "exclude", "blocks", "report")
-MAX_MEANT = 3  # keys of one name, or with the same words in it, that are told
 
 
 def known_keys(group: str) -> list[str]:
@@ -236,17 +232,8 @@ def describe_wrong(group: str, name: str, value: Any) -> str:
 def no_mapping(key: str, value: Any) -> str:
     """Return the error of a value that stands where a group's keys are due."""
     word = f"{quote_value(WORDS[key])} or " if key in WORDS else ""
-    return f"needs {word}a mapping of keys{_example(key)}, not {quote_value(value)}"
-
-
-def _example(group: str) -> str:
-    """Return a key of a group with its default, such as crank_radius_mm: 120."""
-    for name in known_keys(group) if group in GROUPS else ():
-        default = table()[f"{group}.{name}"].default
-        if default is not None:
-            value = f"{default:g}" if isinstance(default, float) else default
-            return f", such as {{{name}: {value}}}"
-    return ""
+    such = "".join(f", such as {{{name}: ...}}" for name in known_keys(key)[:1] if key in GROUPS)
+    return f"needs {word}a mapping of keys{such}, not {quote_value(value)}"
 
 
 def suggestion(name: str, group: str) -> str:
@@ -260,50 +247,26 @@ def suggestion(name: str, group: str) -> str:
         return "; put a space after the colon"
     if name in DOUBLES:
         return f"; write {DOUBLES[name]}, which is half of it"
-    keys = probable_keys(name, group)
-    return f"; did you mean {' or '.join(keys)}?" if 0 < len(keys) <= MAX_MEANT else ""
-
-
-def probable_keys(name: str, group: str) -> list[str]:
-    """Return the dotted keys that an unknown one probably means; in a group, those of the group."""
-    every = [*keys_of(lambda key: key), *DOUBLES]
-    if exact := [key for key in every if _leaf(key) == name]:
-        return exact
-    outer, _, inner = name.rpartition(".")
-    if outer in GROUPS or outer in parts_by_key():
-        return probable_keys(inner, outer)
-    if outer:  # perhaps of a part, and without its group
-        paths = {path: key for key in table() for path in (key, key.partition(".")[2])}
-        return [paths[near] for near in get_close_matches(name, paths, 1, 0.8)]
     if "rotating_mass" in name:
-        return []  # which no key has
-    near = _nearest(name, known_keys(group), 0.6)
-    if near:
-        return [f"{group}.{near}".lstrip(".")]
-    own = [key for key in every if key.startswith(f"{group}.") or not group]
-    near = _nearest(name, [_leaf(key) for key in own], 0.8)
-    words = {*name.lower().split("_")} - {""} or {name}
-    own_parts = [key for key in table() if key.startswith(group)]
-    return (
-        [key for key in own if _leaf(key) == near]
-        or [key for key in own_parts if words <= {*re.split("[_.]", key.lower())}]
-        or [key for key in own if group and words >= {*split_unit(_leaf(key))[0].split("_")}]
-    )
+        return ""  # which no key has
+    every = [*DOUBLES, *keys_of(lambda key: key), *table()]
+    own = [f"{group}.{one}".lstrip(".") for one in known_keys(group)]
+    own += [key for key in DOUBLES if group and key.startswith(f"{group}.")]
+    for keys, cutoff in ((own, 0.58 if group else 0.75), (every, 0.8)):
+        spelled = {}
+        for key in reversed(keys):  # the first of a spelling counts
+            inner = key.partition(".")[2] or key
+            texts = (key, inner, split_unit(key)[0], split_unit(inner)[0])
+            spelled |= {text.lower(): key for text in texts}
+        if near := get_close_matches(name.lower(), spelled, 1, cutoff):
+            return f"; did you mean {spelled[near[0]]}?"
+    words = {*re.split("[_.]", name.lower())}
+    near = [key for key in (*own, *every) if words <= {*re.split("[_.]", key.lower())}]
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 def _leaf(key: str) -> str:
     return key.rpartition(".")[2]
-
-
-def _nearest(name: str, allowed: Sequence[str], cutoff: float) -> str | None:
-    """Return the allowed key with another unit, or else the one most alike."""
-    stems = {split_unit(key)[0]: key for key in reversed(allowed)}
-    for stem in sorted(stems, key=len, reverse=True):
-        if stem != stems[stem] and f"{name}_".startswith(f"{stem}_"):
-            return stems[stem]
-    lower = {key.lower(): key for key in allowed}
-    near = get_close_matches(name.lower(), lower, n=1, cutoff=cutoff)
-    return lower[near[0]] if near else None
 
 
 def hold_value(key: str, value: Any) -> Any:
