@@ -11,7 +11,6 @@ import sympy
 from scipy.integrate import solve_ivp
 
 from compressor.cases.case import Case
-from compressor.cases.conflicts import back_action
 from compressor.physics.observe import COLUMNS, Column
 from compressor.physics.record import state_names
 from compressor.physics.systems import observe_at
@@ -331,8 +330,8 @@ FRAME = {
 def frame_orders():
     """Orders 1 and 2 of a body's velocity (m/s) along x and y, (2, 2): ours, and the frame's.
 
-    Complex. Ours is driven one way, and each line divided by what `back_action` says that it leaves
-    out. The frame is that of Exudyn's model, kept from rocking, at a steady crank speed.
+    Complex. Ours is driven one way, and each line divided by 1 - m G / M, which that leaves out, G
+    the body's acceleration over the force's share (`conflicts.body_rules`). The frame is that of Exudyn's model, kept from rocking, at a steady crank speed.
     """
     case = Case.from_values(FRAME)
     body, pace = case.body, 2.0 * math.pi / case.turn
@@ -353,5 +352,7 @@ def frame_orders():
     ours = simulate(case)["body_velocity"].values[-361:]
     lines = [np.fft.rfft(one[:-1], axis=0)[1:3] / 180 for one in (ours, found.y[2:].T)]
     orders = np.array([1.0, 2.0]) / case.turn
-    back = np.stack([back_action(case, axis, orders) for axis in "xy"], axis=1)
+    pairs, own = orders[:, None], natural / (2.0 * math.pi)
+    stiffness = own**2 - pairs**2 + 2j * body.damping_ratio * own * pairs
+    back = sum(masses[2:]) / body.mass_kg * pairs**2 / stiffness
     return lines[0] / (1.0 - back), lines[1]

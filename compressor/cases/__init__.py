@@ -19,7 +19,7 @@ from compressor.cases.checks import (
     value_of,
     values_given,
 )
-from compressor.cases.conflicts import back_action, outside_judged, reads
+from compressor.cases.conflicts import outside_judged, reads
 from compressor.cases.examples import templates
 from compressor.cases.groups import (
     METHODS,

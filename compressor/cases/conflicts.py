@@ -27,28 +27,6 @@ from compressor.metrics import AXES, JOINTS
 Case = Any  # that of `compressor.cases.case`, which needs these rules
 
 
-def back_action(case: Case, axis: str, frequency: Any) -> Any:
-    """Return the relative change, complex, of the shaking force by the motion of its body.
-
-    A body that accelerates by a takes the moving parts m along, so that the force X on it becomes
-    X - m a. With a = -X G / M, G = f^2 / (f_n^2 - f^2 + 2 i zeta f f_n), the change is m G / M of
-    the force, and the response of a body coupled both ways is that of one driven one way over
-    1 - m G / M. Exact for ideal joints.
-
-    case: one with a body. frequency: Hz, a number or an array, whose shape the result has; axis: x
-    or y.
-    """
-    body = case.body
-    natural = getattr(body, f"frequency_{axis}_Hz")
-    stiffness = natural**2 - frequency**2 + 2j * body.damping_ratio * frequency * natural
-    return moving_mass(case) / body.mass_kg * frequency**2 / stiffness
-
-
-def moving_mass(case: Case) -> float:
-    """Return the rod and reciprocating parts (kg), which a body takes along in both directions."""
-    return case.machine.rod_mass_kg + case.machine.reciprocating_mass_kg
-
-
 # what two materials make, and so facts, too
 OF_MATERIALS = ("contact.modulus_GPa", "contact.stiffness_N_per_mm15", "contact.geometry")
 # what is part of a job's key only where the job reads it: facts, and what follows from them
@@ -365,7 +343,7 @@ def body_rules(case: Case) -> Rules:
     body, sensor = case.body, case.sensor
     if body is None:
         return
-    moving = moving_mass(case)
+    moving = case.machine.rod_mass_kg + case.machine.reciprocating_mass_kg
     share = moving / body.mass_kg
     if share > MAX_MOVING_SHARE:
         much = f"{share:.3g} times" if share >= 1 else f"{100 * share:.2g} % of"
@@ -377,7 +355,12 @@ def body_rules(case: Case) -> Rules:
     axes = sorted({*body.freedoms[:2]} & {*AXES}) if share <= MAX_MOVING_SHARE else ()
     for axis, order in itertools.product(axes, (1, 2)):
         frequency, key = order * case.machine.speed_rpm / 60.0, f"frequency_{axis}_Hz"
-        back = abs(back_action(case, axis, frequency))
+        # A body that accelerates by a takes the moving parts m along, so that the force on it is
+        # X - m a. With a = -X G / M, G = f^2 / (f_n^2 - f^2 + 2 i zeta f f_n), that is a relative
+        # change of m G / M, and one coupled both ways moves as one driven one way over 1 - m G / M.
+        natural = getattr(body, key)
+        stiffness = natural**2 - frequency**2 + 2j * body.damping_ratio * frequency * natural
+        back = abs(share * frequency**2 / stiffness)
         if back > MAX_BACK_ACTION:
             yield (
                 f"body.{key}",

@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING
 
-from compressor.cases.checks import row_of
+from compressor.cases.checks import value_of
 from compressor.cases.laws import CYLINDRICAL
 from compressor.cases.parameter import to_si
 from compressor.cases.table import table
@@ -15,6 +15,12 @@ if TYPE_CHECKING:
 
 # Table 2 of the paper: density (kg/m^3), Young's modulus (Pa), Poisson's ratio
 MATERIALS = {"steel": (7801.0, 2.07e11, 0.29), "copper": (8906.0, 1.19e11, 0.326)}
+
+# lengths whose defaults are of the paper's pin -> why they matter
+LENGTHS = {
+    "lubricant.bearing_length_mm": "a film bears about as the cube of it",
+    "wear.bore_length_mm": "the same wear is half as deep in a bore of twice the length",
+}
 
 
 def composite_modulus(first, second):
@@ -35,13 +41,9 @@ def contact_stiffness(first, second, journal_radius, bearing_radius, internal=Fa
     ZeroDivisionError for internal radii that are alike. Steel on steel with radii 10 and 9.9 mm
     gives Table 3's 3.36e5 N/mm^1.5.
     """
-    compliance = 0.0
-    for name in (first, second):
-        _, modulus, poisson = MATERIALS[name]
-        compliance += (1.0 - poisson**2) / (math.pi * modulus)
     sign = -1.0 if internal else 1.0
     radius = journal_radius * bearing_radius / (bearing_radius + sign * journal_radius)
-    return 4.0 / (3.0 * math.pi * compliance) * math.sqrt(radius)
+    return 4.0 / 3.0 * composite_modulus(first, second) * math.sqrt(radius)
 
 
 def joint_stiffness(
@@ -74,8 +76,7 @@ def paper_notes(case: "Case") -> dict[str, str]:
     They are defaults: the contact stiffness, the length of an oiled bearing, that of a bore that
     wears.
     """
-    contact, film, wear = case.contact, case.lubricant, case.wear
-    found, lengths = {}, {}
+    contact, found = case.contact, {}
     pins = {
         joint: case.machine.pin_radius_mm.at(joint)
         for joint in JOINTS
@@ -90,16 +91,10 @@ def paper_notes(case: "Case") -> dict[str, str]:
             f"{contact.stiffness_N_per_mm15:g} N/mm^1.5 is the paper's, of a pin of {radius:g} mm "
             "radius: give contact.materials, such as [steel, steel], or the stiffness"
         )
-    if film:
-        why = "a film bears about as the cube of it"
-        lengths["lubricant.bearing_length_mm"] = film.bearing_length_mm.at, why
-    if wear:
-        why = "the same wear is half as deep in a bore of twice the length"
-        lengths["wear.bore_length_mm"] = (lambda joint: wear.bore_length_mm), why
-    for key, (length, why) in lengths.items():
-        row = row_of(key)
-        usual = row.default if row else 0.0
-        own = {pin for joint, pin in others.items() if length(joint) == usual}
+    for key, why in LENGTHS.items():
+        rows = {joint: table().get(key) or table()[f"{key}.{joint}"] for joint in JOINTS}
+        usual = rows["big_end"].default
+        own = {pin for one, pin in others.items() if value_of(case, rows[one].key) == usual}
         given = " and ".join(f"{pin:g}" for pin in sorted(own, reverse=True))
         found[key] = given and (
             f"{usual:g} mm is the default, for the paper's pin of {radius:g} mm radius, and yours "
