@@ -330,8 +330,9 @@ FRAME = {
 def frame_orders():
     """Orders 1 and 2 of a body's velocity (m/s) along x and y, (2, 2): ours, and the frame's.
 
-    Complex. Ours is driven one way, and each line divided by 1 - m G / M, which that leaves out, G
-    the body's acceleration over the force's share (`conflicts.body_rules`). The frame is that of Exudyn's model, kept from rocking, at a steady crank speed.
+    Complex. Ours is driven one way, and each line divided by 1 - m G / M, which that leaves out
+    (`conflicts.body_rules`). The frame is that of Exudyn's model, kept from rocking, at a steady
+    crank speed.
     """
     case = Case.from_values(FRAME)
     body, pace = case.body, 2.0 * math.pi / case.turn

@@ -69,23 +69,18 @@ class TextTable:
         Rows at the end without any of these cells are left out. Raises TextTableError for a cell
         that is no finite number, and for a gap.
         """
-        lines: list[int] = []
-        cells_of: list[list[str]] = [[] for _ in numbers]
-        blank = 0  # the first row without these cells: beyond the end of the table
-        for line, cells in self.rows:
-            texts = [cells[at].strip() if at < len(cells) else "" for at in numbers]
-            if not any(texts):
-                blank = blank or line
-                continue
-            if blank:
-                problem = "the cells are empty, and the table goes on below"
-                raise TextTableError(f"{self.path}:{blank}: {problem}; cut it, or fill the gap")
-            lines.append(line)
-            for text, column in zip(texts, cells_of, strict=True):
-                column.append(text)
-        return lines, [
-            [self._number(text, line, at) for text, line in zip(texts, lines, strict=True)]
-            for at, texts in zip(numbers, cells_of, strict=True)
+        rows = [
+            (line, [cells[at].strip() if at < len(cells) else "" for at in numbers])
+            for line, cells in self.rows
+        ]
+        while rows and not any(rows[-1][1]):  # beyond the end of the table
+            rows.pop()
+        for line in (line for line, texts in rows if not any(texts)):
+            problem = "the cells are empty, and the table goes on below"
+            raise TextTableError(f"{self.path}:{line}: {problem}; cut it, or fill the gap")
+        return [line for line, _ in rows], [
+            [self._number(texts[k], line, at) for line, texts in rows]
+            for k, at in enumerate(numbers)
         ]
 
     def _number(self, text: str, line: int, column: int) -> float:
