@@ -134,14 +134,8 @@ class CompsimError(Exception):
     2 WrongName
     """
 
-    exit_code = 1
-    prefix = "compsim: "
-
-
-class NoCodeFolder(CompsimError):
-    """Machine code can be kept nowhere."""
-
     exit_code = 2
+    prefix = "compsim: "
 
 
 class CompsimWarning(UserWarning):
@@ -209,7 +203,7 @@ def machine_code_folder() -> Path:
     """Return the folder of machine code, named by a hash of the sources and numba's version.
 
     It is in NUMBA_CACHE_DIR if that is set, else beside the sources, else in the user's cache.
-    Raises NoCodeFolder where nothing can be written. Numba itself would go on using a caller's old
+    Raises CompsimError where nothing can be written. Numba itself would go on using a caller's old
     code after a change of what it calls in another file, and may read another version's halfway
     through its own.
     """
@@ -221,7 +215,7 @@ def machine_code_folder() -> Path:
             return place / f"numba-{sources_hash(COMPILED)}-{metadata.version('numba')}"
     where = named or f"beside {COMPILED} or in the user's cache"
     text = f"nothing can be written to {where}, where machine code would be kept"
-    raise NoCodeFolder(f"{text}: set {CODE_VARIABLE} to a folder that stays")
+    raise CompsimError(f"{text}: set {CODE_VARIABLE} to a folder that stays")
 
 
 @functools.cache

@@ -43,8 +43,6 @@ DRIVING = -0.02  # of pressure range times stroke: work that the gas of no compr
 class CardError(CompsimError):
     """A file that is no card; its text names file and line."""
 
-    exit_code = 2
-
 
 class Card(NamedTuple):
     """A mean revolution of a card."""

@@ -253,7 +253,7 @@ def suggestion(name: str, group: str) -> str:
     own = [f"{group}.{one}".lstrip(".") for one in known_keys(group)]
     own += [key for key in DOUBLES if group and key.startswith(f"{group}.")]
     for keys, cutoff in ((own, 0.58 if group else 0.75), (every, 0.8)):
-        spelled = {}
+        spelled: dict[str, str] = {}
         for key in reversed(keys):  # the first of a spelling counts
             inner = key.partition(".")[2] or key
             texts = (key, inner, split_unit(key)[0], split_unit(inner)[0])

@@ -160,8 +160,6 @@ class CaseError(CompsimError, ValueError):
     machine.speed: unknown key; did you mean machine.speed_rpm?
     """
 
-    exit_code = 2
-
     def __init__(self, problems: Sequence[Problem], is_misfit: bool = False):
         self.problems = problems
         self.is_misfit = is_misfit  # of values that are good alone and do not fit each other

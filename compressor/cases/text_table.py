@@ -34,8 +34,6 @@ UNIT_WORDS = {  # of a line of units below the header
 class TextTableError(CompsimError):
     """A text that is no table of numbers; its message names file, line and column."""
 
-    exit_code = 2
-
 
 Row = tuple[int, list[str]]  # the number of its last line, and its cells
 

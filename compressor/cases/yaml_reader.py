@@ -306,7 +306,6 @@ class CaseFileError(CompsimError, ValueError):
     typo.yaml:2:1: clearance: unknown key; did you mean clearance_mm?
     """
 
-    exit_code = 2
     prefix = ""  # each line begins with the file that it is about
 
     def __init__(self, problems: Sequence[Problem]):

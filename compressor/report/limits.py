@@ -25,8 +25,6 @@ MORE_IS_BETTER = ("rod_load_reversal_angle",)  # A would be the worst zone
 class LimitError(CompsimError, ValueError):
     """Limits that cannot be used: what is wrong with them and what to write."""
 
-    exit_code = 2
-
 
 @dataclass(frozen=True)
 class Limits:

@@ -29,8 +29,6 @@ from compressor.units import Units
 class PlotError(CompsimError):
     """What cannot be drawn: why, and what to do about it."""
 
-    exit_code = 2
-
 
 def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tuple[str, ...]:
     """Return the figures to draw: those requested, by default all.

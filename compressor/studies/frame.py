@@ -38,8 +38,6 @@ Point = tuple[float, ...]  # values of keys, in the case file's units
 class StudyError(program.CompsimError, ValueError):
     """A question that a study cannot answer: and what to do."""
 
-    exit_code = 2
-
 
 @dataclass(frozen=True)
 class KeySpan:

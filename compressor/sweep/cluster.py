@@ -35,8 +35,6 @@ SAME = "have the same programs on all machines, then start its workers again"
 class ClusterError(CompsimError):
     """A cluster that cannot be used: which, why, and what to do about it."""
 
-    exit_code = 2
-
 
 @functools.cache
 def versions() -> dict[str, str]:

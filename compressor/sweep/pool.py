@@ -54,8 +54,6 @@ START = (  # the loader's program, which has our path and not our main module
 class UnsupportedSystem(CompsimError):
     """A system on which no jobs are run, such as Windows."""
 
-    exit_code = 2
-
 
 class Job(NamedTuple):
     """A job that is not finished; one that is tried again runs alone."""

@@ -30,6 +30,8 @@ Store = Callable[[list[Any]], list[Any]]  # of results; returns what is sent hom
 class WorkersFailed(CompsimError):
     """Worker processes cannot be started, or die before they begin a job."""
 
+    exit_code = 1
+
 
 class End(NamedTuple):
     """How a job ended: its result and the seconds that it took, or why it has none.

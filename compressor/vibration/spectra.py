@@ -24,8 +24,6 @@ SAME_ANGLE = 1e-9  # share of an interval of angle: nearer ones are the same
 class RecordError(CompsimError):
     """A record or a signal that cannot be read or used: too short, without tacho, not finite."""
 
-    exit_code = 2
-
 
 def check_signal(values: np.ndarray) -> np.ndarray:
     """Return a signal as floats, (m,). Raises RecordError unless it is real, finite, in a row."""

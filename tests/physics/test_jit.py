@@ -78,5 +78,5 @@ def test_a_named_folder_that_takes_no_file_is_refused(kind, tmp_path, monkeypatc
         named.write_text("")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(named))
     told = f"to {named}, .*: set NUMBA_CACHE_DIR to a folder"
-    with pytest.raises(program.NoCodeFolder, match=told):
+    with pytest.raises(program.CompsimError, match=told):
         program.machine_code_folder()
