@@ -56,25 +56,18 @@ def report_progress(things: Sequence[Thing], progress: Progress) -> Iterator[Thi
     progress(len(things), len(things), "")
 
 
-def can_copy() -> bool:
-    """Return whether a copy of this process may work beside it.
-
-    Not with one core, beside threads, whose locks it would take along, in a process that may have
-    no children, and where the system makes no copies.
-    """
-    affinity = getattr(os, "sched_getaffinity", None)
-    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
-    is_free = threading.active_count() == 1 and not multiprocessing.current_process().daemon
-    return cores > 1 and is_free and "fork" in multiprocessing.get_all_start_methods()
-
-
 @contextlib.contextmanager
 def work_beside(work: Callable[[], Thing]) -> Iterator[Callable[[], Thing]]:
     """Have a copy of this process do some work meanwhile; yield what waits for its result.
 
-    All is done here, where that is called, without `can_copy` and where the copy dies. What work
-    raises is raised here.
+    All is done here, where that is called, with one core, beside threads, whose locks a copy would
+    take along, in a process that may have no children, where the system makes no copies, and where
+    the copy dies. What work raises is raised here.
     """
+    affinity = getattr(os, "sched_getaffinity", None)
+    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
+    is_free = threading.active_count() == 1 and not multiprocessing.current_process().daemon
+    can_copy = cores > 1 and is_free and "fork" in multiprocessing.get_all_start_methods()
     here, there = multiprocessing.Pipe(duplex=False)
 
     def result() -> Thing:
@@ -82,7 +75,7 @@ def work_beside(work: Callable[[], Thing]) -> Iterator[Callable[[], Thing]]:
             return here.recv()
         return work()
 
-    copy = copy_beside(_send_result, work, here, there) if can_copy() else contextlib.nullcontext()
+    copy = copy_beside(_send_result, work, here, there) if can_copy else contextlib.nullcontext()
     with here, copy:
         there.close()
         yield result

@@ -7,11 +7,11 @@ whole, for its key and for what is wrong with its values, and again when it is u
 
 import itertools
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from compressor.cases.case import Case
 from compressor.cases.checks import DOUBLES, expand_synonyms, key_of, row_of, stands_for, value_of
@@ -37,7 +37,7 @@ from compressor.cases.yaml_reader import (
     read_file,
     shorten,
 )
-from compressor.program import Progress, can_copy, no_progress, work_beside
+from compressor.program import Progress, no_progress, work_beside
 
 MAX_JOBS = 10_000
 NONE_SELECTED = "selects no job; compsim plan without it lists those that there are"
@@ -298,64 +298,45 @@ def _columns(blocks: Sequence[Block]) -> list[str]:
     return [*dict.fromkeys(parts)]
 
 
-class CheckedCases(NamedTuple):
-    """What checks of some cases have found.
-
-    `values`: of each swept key. `selected`: numbers of the cases to be run. Where anything is
-    wrong, these and the `keys` lack later cases. `misfits` are told behind what is `wrong` alone,
-    from which some follow.
-    """
-
-    keys: list[str]
-    values: dict[str, list[Any]]
-    selected: list[int]
-    wrong: Located
-    misfits: Located
-
-
 def _check_cases(
     file: CaseFile, cases: Cases, columns: Sequence[str], only: Test | None, progress: Progress
-) -> tuple[tuple[str, ...], dict[str, list[Any]], list[int]]:
+) -> tuple[tuple[str, ...], dict[str, Sequence[Any]], list[int]]:
     """Return the key of each case, its value of each swept key, and the numbers of those selected.
 
     Of many cases a copy of this process checks one half. Raises CaseFileError.
     """
     total, check = len(cases), partial(_check_some, cases, columns, only)
-    is_large, remark = total >= MANY_CASES, f"{file.name}: {total} jobs"
-    progress = progress if is_large else no_progress
-    if not is_large or not can_copy():
-        progress(0, total, remark)
-        parts = [check(range(total), progress)]
+    half = total // 2
+    if total < MANY_CASES:
+        parts = [check(range(total), no_progress)]
     else:
-        half = total // 2
-        with work_beside(lambda: check(range(half, total))) as others:
-            progress(0, total, remark)  # after which a thread may draw it
+        with work_beside(lambda: check(range(half, total), no_progress)) as others:
+            progress(0, total, f"{file.name}: {total} jobs")  # after which a thread may draw it
             parts = [check(range(half), lambda done, *_: progress(2 * done, total, "")), others()]
-    progress(total, total, "")
-    wrong: Located = {}
-    for located in (*(part.wrong for part in parts), *(part.misfits for part in parts)):
-        for where, problem in located.items():
-            wrong.setdefault(where, problem)
+        progress(total, total, "")
+    keys, rows, selected, found = zip(*parts, strict=True)
+    chain, wrong = itertools.chain.from_iterable, found[0] | found[-1] | found[0]
     problems = [*itertools.islice(wrong.values(), MAX_CONFLICTS)]
     if len(wrong) > MAX_CONFLICTS:
         message = f"{len(wrong)} problems of swept values; the first {MAX_CONFLICTS} are"
         problems.append(Problem("", message, Place(file.path)))
     if problems:
         raise CaseFileError(problems)
-    keys = tuple(key for part in parts for key in part.keys)
-    values = {key: [one for part in parts for one in part.values[key]] for key in columns}
-    return keys, values, [number for part in parts for number in part.selected]
+    values: dict[str, Sequence[Any]] = dict(
+        zip(columns, zip(*chain(rows), strict=True), strict=True)
+    )
+    return (*chain(keys),), values, [*chain(selected)]
 
 
 def _check_some(
-    cases: Cases,
-    columns: Sequence[str],
-    only: Test | None,
-    numbers: range,
-    progress: Progress = no_progress,
-) -> CheckedCases:
-    """Return what the checks of cases of some numbers find."""
-    found = CheckedCases([], {key: [] for key in columns}, [], {}, {})
+    cases: Cases, columns: Sequence[str], only: Test | None, numbers: range, progress: Progress
+) -> tuple[list[str], list[tuple[Any, ...]], list[int], Located]:
+    """Return keys and swept values of cases of some numbers, those selected, and what is wrong.
+
+    Where anything is wrong, the first three lack cases.
+    """
+    keys, rows, selected = [], [], []
+    wrong: Located = {}
     for number in numbers:
         if number % 1000 == 0:
             progress(number - numbers.start, len(numbers), "")
@@ -363,22 +344,13 @@ def _check_some(
         try:
             case = block.case(place)
         except CaseError as error:
-            located = found.misfits if error.is_misfit else found.wrong
-            for where, problem in block.locate(error, block.rows_of(place)).items():
-                located.setdefault(where, problem)
+            wrong |= block.locate(error, block.rows_of(place)) | wrong
             continue
-        if not (found.wrong or found.misfits):
-            found.keys.append(case.key)
-            for key in columns:
-                found.values[key].append(value_of(case, key))
-            if only is None or is_selected(only, block.given_of(place), case):
-                found.selected.append(number)
-    return found
-
-
-def is_selected(only: Test, given: Mapping[str, Any], case: Case) -> bool:
-    """Return whether a comparison holds for a job; given: nested values of the file."""
-    return only(reader(given, lambda: case))
+        keys.append(case.key)
+        rows.append(tuple(value_of(case, key) for key in columns))
+        if only is None or only(reader(block.given_of(place), lambda: case)):  # noqa: B023
+            selected.append(number)
+    return keys, rows, selected, wrong
 
 
 def _find_problems(paths: Sequence[str | os.PathLike[str]], max_jobs: int) -> list[Problem]:
