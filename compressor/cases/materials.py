@@ -41,9 +41,13 @@ def contact_stiffness(first, second, journal_radius, bearing_radius, internal=Fa
     ZeroDivisionError for internal radii that are alike. Steel on steel with radii 10 and 9.9 mm
     gives Table 3's 3.36e5 N/mm^1.5.
     """
+    compliance = 0.0
+    for name in (first, second):
+        _, modulus, poisson = MATERIALS[name]
+        compliance += (1.0 - poisson**2) / (math.pi * modulus)
     sign = -1.0 if internal else 1.0
     radius = journal_radius * bearing_radius / (bearing_radius + sign * journal_radius)
-    return 4.0 / 3.0 * composite_modulus(first, second) * math.sqrt(radius)
+    return 4.0 / (3.0 * math.pi * compliance) * math.sqrt(radius)
 
 
 def joint_stiffness(

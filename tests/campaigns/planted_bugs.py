@@ -40,7 +40,7 @@ BUGS = [
     ("the cam does not close", "physics/loads.py",
      "angle_at(rod_length - crank_radius + stroke", "angle_at(rod_length + crank_radius - stroke"),
     ("the follower's lift is the spring's stroke", "analysis/cam.py",
-     "2.0 * self.p.crank_radius - self.p.spring_stroke", "self.p.spring_stroke"),
+     "top - self.p.spring_stroke)", "top - 2.0 * self.p.crank_radius + self.p.spring_stroke)"),
     # record
     ("K as the paper prints it, per mm", "cases/materials.py",
      "1000.0**contact.exponent", "1000.0"),
