@@ -17,17 +17,17 @@ from types import SimpleNamespace
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import Claim, mean_peak
+from compressor.analysis import SPOKEN, Claim, mean_peak
 from compressor.cases import MODEL_VERSION, Case
-from compressor.digits import UNKNOWN
+from compressor.digits import UNKNOWN, setting
 from compressor.metrics import BARRED, JOINTS
 from compressor.outcome import Regime
 from compressor.program import PROGRAM, library_versions
 from compressor.report.figures.sweep_data import (
     Measure,
-    axis_of,
     differ_beyond_bars,
     measures,
+    name_in_words,
     swept_values,
 )
 from compressor.report.page import (
@@ -179,9 +179,12 @@ def several_values(data: xr.Dataset) -> dict[str, np.ndarray]:
 
 def name_jobs(data: xr.Dataset) -> list[str]:
     """Return what is swept at each job of a study, in words."""
-    swept = [replace(axis_of(data, name), values=v) for name, v in several_values(data).items()]
-    jobs = range(data["status"].size)
-    return [", ".join(filter(None, (axis.value_text(n) for axis in swept))) for n in jobs]
+    words = []
+    for name, values in several_values(data).items():
+        unit = data[name].attrs.get("units", "")  # once: xarray takes 0.1 ms to find it
+        words.append([word_value(name, value, unit) for value in values.tolist()])
+    jobs = zip(*words, strict=True) if words else [()] * data["status"].size
+    return [", ".join(filter(None, parts)) for parts in jobs]
 
 
 def ascending_jobs(data: xr.Dataset) -> list[int]:
@@ -190,6 +193,16 @@ def ascending_jobs(data: xr.Dataset) -> list[int]:
     if len(swept) != 1 or swept[0].dtype.kind not in "fiu" or np.isnan(swept[0]).any():
         return []
     return np.argsort(swept[0], kind="stable").tolist()
+
+
+def word_value(name: str, value: object, unit: str) -> str:
+    """Return a swept value in words: clearance 0.2 mm; "" where the job has none."""
+    words = name_in_words(name, unit)
+    if isinstance(value, int | float):
+        if math.isnan(value):
+            return ""
+        return f"{words} {setting(value)} {unit}".removesuffix(" 1").rstrip()
+    return f"{words} {SPOKEN.get(str(value), value)}" if value != "" else ""
 
 
 def rank_findings(

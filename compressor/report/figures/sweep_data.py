@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import SPOKEN
-from compressor.digits import ROUNDING, setting
+from compressor.digits import ROUNDING
 from compressor.metrics import AXES, BARRED, JOINTS
 from compressor.report.figures.drawing import thin_places
 from compressor.report.figures.style import RED, mark
@@ -122,10 +122,11 @@ def swept_values(data: xr.Dataset) -> dict[str, np.ndarray]:
 def shown_value(value: Any) -> str:
     """Return a swept value in few characters."""
     is_number = isinstance(value, float | int | np.number) and not isinstance(value, bool)
-    return setting(value) if is_number else str(value)
+    return f"{value:g}" if is_number else str(value)
 
 
 LOG_RATIO = 100.0  # numbers that span more are drawn on a log scale
+LONG_PHRASE = 30  # letters of a phrase: less than of one joint, so that both have one form
 
 
 @dataclass(frozen=True)
@@ -169,12 +170,13 @@ class PlottedAxis:
         return f"{self.phrase} ({self.unit})" if self.unit not in ("", "1") else self.phrase
 
     def value_text(self, number: int) -> str:
-        """Return one of its values in words, such as `rod mass 3 kg`; "" where a job has none."""
+        """Return one of its values in words, such as `rod mass 3 kg`."""
         value = self.values[number]
         if self.is_words:
-            return name_value(self.phrase, format_swept(value)) if value != "" else ""
-        unit = f" {self.unit}" * (self.unit != "1")
-        return "" if np.isnan(value) else f"{self.phrase} {format_swept(value)}{unit}"
+            return name_value(self.phrase, format_swept(value))
+        return f"{self.phrase} {format_swept(value)}" + (
+            f" {self.unit}" if self.unit != "1" else ""
+        )
 
 
 @dataclass(frozen=True)
@@ -256,7 +258,9 @@ def axis_of(data: xr.Dataset, name: str) -> PlottedAxis:
     """Return an axis of a study with its phrase and unit."""
     values, attrs = data[name].values, data[name].attrs
     unit, key = str(attrs.get("units", "")), str(attrs.get("case_key", name))
-    phrase = name_in_words(name if unit else key.rpartition(".")[2], unit)
+    phrase = str(attrs.get("long_name", key))
+    if phrase in (key, name) or len(phrase) > LONG_PHRASE or values.dtype.kind not in "fiu":
+        phrase = name_in_words(name if unit else key.rpartition(".")[2], unit)
     return PlottedAxis(name, phrase, unit, values)
 
 
