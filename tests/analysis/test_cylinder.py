@@ -142,8 +142,7 @@ def test_another_program_s_double_acting_machine():
     degrees = np.degrees([p.corners[0], p.corners[2], *p.crank_corners])
     assert degrees == pytest.approx([33.4, 265.5, 79.1, 220.9], abs=0.05)
     assert static_load(p) == pytest.approx(880587, rel=2e-5)
-    towards_head = p.crank_discharge_force - p.suction_force
-    assert towards_head == pytest.approx(798797, rel=2e-5)
+    assert p.crank_discharge_force - p.suction_force == pytest.approx(798797, rel=2e-5)
 
 
 def test_a_text_book_s_compressor():

@@ -92,8 +92,7 @@ def test_metrics_are_bit_equal_with_and_without_bars():
 
 def test_bars_cover_most_true_errors():
     eight = [(run(values), run(values, rtol=1e-11, error_bars=False)) for values in EIGHT]
-    covered = np.concatenate([within(*pair) for pair in eight])
-    assert covered.mean() >= 0.9
+    assert np.concatenate([within(*pair) for pair in eight]).mean() >= 0.9
     # and no more than needed: they do not cover when they are ten times shorter
     assert np.concatenate([within(*pair, stretch=0.1) for pair in eight]).mean() < 0.7
 

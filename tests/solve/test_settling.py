@@ -34,8 +34,7 @@ def test_a_case_settles_where_its_revolutions_agree():
     found = measure(case(**AUTO))
     assert (found.status, found.attributes["promise"]) == ("ok", "kept")
     settled = found.numbers["settled_rev"]
-    of = case()
-    assert settled == pytest.approx(found.attributes["settle"] / of.turn)
+    assert settled == pytest.approx(found.attributes["settle"] / case().turn)
     assert settled in (0, 1)
     same = measure(case(settle_rev=settled, duration_rev=settled + MEASURED_REV))
     for name in METRICS:

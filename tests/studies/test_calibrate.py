@@ -84,8 +84,7 @@ def test_what_is_not_told_apart_is_named():
     found = fit_of(truth, 3)
     assert found.open_directions == ((2, 3),)
     assert found.deviations[0] < 0.02 < 0.15 < found.deviations[2]
-    ratio = (1 + found.shares[2]) / (1 + found.shares[3])
-    assert ratio == pytest.approx(1.0, abs=0.02)
+    assert (1 + found.shares[2]) / (1 + found.shares[3]) == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_machine_that_is_another_says_so():
@@ -106,8 +105,7 @@ def test_points_that_fail_are_left():
 
     found = fit_orders(half, amplitudes, errors, design(3))
     assert found.shares == pytest.approx(truth, abs=0.02)
-    nothing = fit_orders(lambda s: half(s) * np.nan, amplitudes, errors, design(3))
-    assert nothing is None
+    assert fit_orders(lambda s: half(s) * np.nan, amplitudes, errors, design(3)) is None
 
 
 def test_orders_are_amplitude_and_phase_from_top_dead_centre():
@@ -121,8 +119,7 @@ def test_orders_are_amplitude_and_phase_from_top_dead_centre():
     found = orders_of(Record(times, values + noise, pulses[pulses < times[-1]], np.nan))
     expected = np.zeros(found.amplitudes.size, complex)
     expected[2], expected[19] = 2.0 * np.exp(0.5j), 0.25 * np.exp(-1j)
-    off = np.abs(found.amplitudes - expected)
-    assert off.max() < 5.0 * found.errors.max()
+    assert np.abs(found.amplitudes - expected).max() < 5.0 * found.errors.max()
     # white noise of sigma: each line of a revolution has 2 sigma / sqrt(samples)
     scatter = 2 * 0.1 / np.sqrt(rate / speed) / np.sqrt(found.revolutions)
     assert np.median(found.errors) == pytest.approx(scatter, rel=0.2)
