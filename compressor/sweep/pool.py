@@ -14,6 +14,7 @@ import os
 import pickle
 import platform
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -22,7 +23,6 @@ from collections.abc import Callable, Generator, Hashable, Iterable, Iterator
 from dataclasses import replace
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
-from multiprocessing.reduction import send_handle
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -278,7 +278,9 @@ class Loader:
         with self.lock, contextlib.suppress(EOFError, OSError):
             self.calls.send(pid)
             if pipe:
-                send_handle(self.calls, pipe.fileno(), self.process.pid)
+                kind = socket.AF_UNIX, socket.SOCK_STREAM
+                with socket.fromfd(self.calls.fileno(), *kind) as carrier:
+                    socket.send_fds(carrier, [b"1"], [pipe.fileno()])
             return receive(self.calls, MAX_SILENCE)
         self.end()
         raise Death(describe_ending(self.process.returncode))
@@ -291,7 +293,8 @@ class Loader:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self.process.wait(END_SECONDS)
         if self.process.poll() is None:
-            os.killpg(self.process.pid, signal.SIGKILL)
+            with contextlib.suppress(ProcessLookupError, PermissionError):  # another was first
+                os.killpg(self.process.pid, signal.SIGKILL)
             self.process.wait()
 
 
@@ -329,7 +332,7 @@ class Worker:
 def receive(pipe: Connection, seconds: float) -> Any:
     """Return what comes through a pipe. Raises TimeoutError, and EOFError or OSError at its end.
 
-    Ticks are counted, since time goes on while all processes are stopped, as by Ctrl-Z.
+    Ticks are counted, since time goes on while this process is stopped, as by Ctrl-Z.
     """
     for _ in range(math.ceil(min(seconds, 1e9) / TICK)):
         if pipe.poll(TICK):

@@ -4,13 +4,13 @@ import contextlib
 import gc
 import os
 import signal
+import socket
 import sys
 import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from multiprocessing.reduction import recv_handle
 from typing import Any, NamedTuple
 
 from compressor.program import CompsimError, die_with_parent
@@ -94,14 +94,15 @@ def serve(calls: Connection) -> None:
 def answer_calls(calls: Connection) -> Connection | None:
     """Make and end workers; return the pipe of one in its process, None at the end of `calls`."""
     workers: set[int] = set()
-    with contextlib.suppress(EOFError, OSError, RuntimeError):  # of what was cut short, too
+    with contextlib.suppress(EOFError, OSError, ValueError):  # of what was cut short, too
         while True:
             if pid := calls.recv():
                 workers.discard(pid)
                 os.kill(pid, signal.SIGKILL)
                 calls.send(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
                 continue
-            file = recv_handle(calls)
+            with socket.fromfd(calls.fileno(), socket.AF_UNIX, socket.SOCK_STREAM) as carrier:
+                _, (file,), _, _ = socket.recv_fds(carrier, 1, 1)
             try:
                 pid = os.fork()
             except OSError as error:
@@ -146,7 +147,8 @@ def serve_batches(
 def settle() -> None:
     """Make this process a worker: its end, signals and streams."""
     die_with_parent()
-    for number in (signal.SIGINT, signal.SIGHUP):  # which are for the parent: it ends us
+    # which are for the parent: it ends us; a terminal is to stop nobody who writes to it
+    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTTOU):
         signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # ignored, exit codes would be lost
     with contextlib.suppress(OSError):  # there may be no stderr

@@ -15,6 +15,7 @@ from pathlib import Path
 import bad_jobs
 import pytest
 from bad_jobs import LEAST, POISON, named, work
+from chaos.processes import members
 from conftest import wait_for
 
 from compressor.store import StoreError
@@ -144,29 +145,45 @@ from compressor.sweep.worker import Workers
 """
 
 
+OURS = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
+
+
 def started(folder, text):
     """A process group that runs two jobs of a script; the script, and the jobs' processes."""
     (folder / "script.py").write_text(SCRIPT + text)
     script = subprocess.Popen(
         [sys.executable, folder / "script.py"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         text=True, start_new_session=True,
-        env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
+        env=OURS,
     )  # fmt: skip
     return script, [int(script.stderr.readline()) for _ in range(2)]
 
 
 def test_a_worker_s_time_stands_still_with_ours(tmp_path):
-    """All are stopped, as by Ctrl-Z, for longer than the job may take."""
+    """All are stopped, as by a machine's sleep, for longer than the job may take."""
     running, _ = started(tmp_path, """
 sleep = functools.partial(bad_jobs.announced, do=time.sleep)
 for end in run_batches(sleep, [(n, 0.4, 0.6) for n in range(2)], Workers(2, grace=0.4)):
     print(end)
 """)  # fmt: skip
-    os.killpg(running.pid, signal.SIGSTOP)
-    time.sleep(1.2)
-    os.killpg(running.pid, signal.SIGCONT)
+    for number in (signal.SIGSTOP, signal.SIGCONT):
+        for pid in members(running.pid):
+            os.kill(pid, number)
+        time.sleep(1.2)
     said, _ = running.communicate(timeout=60)
     assert said.count("reason=''") == 2
+
+
+def test_a_terminal_stops_no_worker_that_writes_to_it(tmp_path):
+    (tmp_path / "script.py").write_text(f"""{SCRIPT}
+sleep = functools.partial(bad_jobs.announced, do=time.sleep)
+for end in run_batches(sleep, [(n, 0.1, 5.0) for n in range(2)], Workers(2)):
+    print(end)
+""")
+    line = f"stty tostop; exec {sys.executable} {tmp_path / 'script.py'}"
+    spawn = [sys.executable, "-c", f"import pty; pty.spawn(['sh', '-c', {line!r}])"]
+    said = subprocess.check_output(spawn, stdin=subprocess.DEVNULL, timeout=60, env=OURS)
+    assert said.count(b"reason=''") == 2
 
 
 @pytest.mark.parametrize(

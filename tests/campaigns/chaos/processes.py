@@ -59,7 +59,7 @@ class Run:
             patience = 0.0
 
     def send(self, number, whole=False):
-        """Send a signal to itself alone, or to the whole session at once."""
+        """Send a signal to itself alone, or to each of its session."""
         for pid in members(self.pid) if whole else [self.pid]:
             with contextlib.suppress(ProcessLookupError):  # it may have ended
                 os.kill(pid, number)
