@@ -203,6 +203,7 @@ def _spell_scaled(value: Any, factor: float) -> str:
 # keys of a case file that are no part of a case: how values are swept together, what the page of
 # the report says of the machine
 SWEEP = ("sample", "zip", "exclude", "blocks", "report")
+MAX_MEANT = 3  # keys that have a name's words in them: of more, none is a guess
 
 
 def known_keys(group: str) -> list[str]:
@@ -232,7 +233,10 @@ def describe_wrong(group: str, name: str, value: Any) -> str:
 def no_mapping(key: str, value: Any) -> str:
     """Return the error of a value that stands where a group's keys are due."""
     word = f"{quote_value(WORDS[key])} or " if key in WORDS else ""
-    such = "".join(f", such as {{{name}: ...}}" for name in known_keys(key)[:1] if key in GROUPS)
+    rows = (table()[f"{key}.{name}"] for name in known_keys(key)) if key in GROUPS else ()
+    row = next((row for row in rows if row.default is not None), None)
+    value = str(row.default).removesuffix(".0") if row else ""
+    such = f", such as {{{_leaf(row.key)}: {value}}}" if row else ""
     return f"needs {word}a mapping of keys{such}, not {quote_value(value)}"
 
 
@@ -250,6 +254,8 @@ def suggestion(name: str, group: str) -> str:
     if "rotating_mass" in name:
         return ""  # which no key has
     every = [*DOUBLES, *keys_of(lambda key: key), *table()]
+    if exact := [key for key in every if _leaf(key) == name]:
+        return f"; did you mean {exact[0]}?"
     own = [f"{group}.{one}".lstrip(".") for one in known_keys(group)]
     own += [key for key in DOUBLES if group and key.startswith(f"{group}.")]
     for keys, cutoff in ((own, 0.58 if group else 0.75), (every, 0.8)):
@@ -262,7 +268,7 @@ def suggestion(name: str, group: str) -> str:
             return f"; did you mean {spelled[near[0]]}?"
     words = {*re.split("[_.]", name.lower())}
     near = [key for key in (*own, *every) if words <= {*re.split("[_.]", key.lower())}]
-    return f"; did you mean {near[0]}?" if near else ""
+    return f"; did you mean {near[0]}?" if 0 < len({*near}) <= MAX_MEANT else ""
 
 
 def _leaf(key: str) -> str:

@@ -112,13 +112,13 @@ def _compare_job(key: str, sign: Any, text: str) -> Test:
     if row.kind in ("materials", "text", "card"):
         raise NoComparison(f"{key} cannot be compared")
     wanted = row.choice_of(wanted)
+    word = wanted if row.is_number else key
+    if isinstance(word, str) and sign not in EQUAL and (word == key or word in row.choices):
+        raise NoComparison(f"{word} is a word: compare it by == or !=")
     if wanted not in row.choices and (
         type(wanted) not in (int, float) if row.is_number else row.check(wanted)
     ):
         raise NoComparison(f"{key} needs {'a number' if row.is_number else row.needed}, not {text}")
-    word = wanted if row.is_number else key
-    if isinstance(word, str) and sign not in EQUAL:
-        raise NoComparison(f"{word} is a word: compare it by == or !=")
     return _compare(lambda value: value(key), sign, wanted)
 
 
