@@ -73,6 +73,8 @@ def _merge_alike(stored: Stored, batches: list[Counting]) -> None:
             outcomes = stored.outcomes(np.concatenate(jobs))
         except StoreError:
             continue
+        if not {*paths} <= {*stored.places[0]}:
+            continue  # another run has merged them meanwhile
         publish_batch(stored.folder, encode_batch(outcomes), paths[-1].name[:20])
         for path in paths:
             path.unlink(missing_ok=True)

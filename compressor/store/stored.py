@@ -286,7 +286,7 @@ class Stored:
         return Outcome(status, reason, self.numbers([position])[0], self.attributes(position))
 
     def outcomes(self, positions: np.ndarray) -> list[Outcome]:
-        """Return all that is stored of jobs."""
+        """Return all that is stored of jobs; how they ended is of when the store was read."""
         ends = (self.words(name)[positions].tolist() for name in ("status", "reason"))
         found = zip(*ends, self.numbers(positions), positions, self.series(positions), strict=True)
         return [

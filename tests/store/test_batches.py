@@ -130,6 +130,19 @@ def test_a_batch_whose_values_are_damaged_stays_while_its_rows_count(mixed):
     assert read_store(mixed).position(key(5)) is not None
 
 
+def test_a_merge_that_another_was_faster_at_writes_nothing(mixed, monkeypatch):
+    jobs, real = held(read_store(mixed)), merge._merge_alike
+
+    def late(*args):
+        monkeypatch.undo()
+        merge_all(mixed)
+        real(*args)
+
+    monkeypatch.setattr(merge, "_merge_alike", late)
+    merge_all(mixed)
+    assert (len(batches(mixed)), held(read_store(mixed))) == (3, jobs)
+
+
 def test_a_reader_that_loses_the_race_with_a_merge_reads_again(mixed, monkeypatch):
     jobs = held(read_store(mixed))
 
