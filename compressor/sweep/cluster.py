@@ -141,6 +141,8 @@ def run_on_cluster(
                     suspects += batch
                 continue
             except Exception as error:  # such as that it cannot be found there
+                if future.cancelled() or client.status != "running":
+                    raise lost_scheduler from error
                 problem = f"no compsim, or an old one ({error})"
             if problem:
                 raise ClusterError(f"a worker of the cluster has {problem}; {SAME}")
