@@ -56,7 +56,6 @@ from compressor.metrics import JOINTS
 
 MODEL_VERSION = "3"  # of equations and of the meaning of what is stored; part of a key
 MAX_REV = 50.0  # with `duration_rev: auto`
-MAX_GROUPS = 4096  # whose identities are remembered
 SOUND = PerJoint(0.0, 0.0)  # a healthy clearance that no case need name
 FOLLOWING = ("gas.switching", "gas.back_pressure_MPa")  # from what else is given of a cylinder
 OWN_GAS = {key for key in (*table(), *parts_by_key()) if key.startswith("gas.")} - {*FOLLOWING}
@@ -441,7 +440,7 @@ def find_given(values: Mapping[str, Any]) -> frozenset[str]:
     return _with_parts(frozenset(values_given(values)))
 
 
-@lru_cache(MAX_GROUPS)  # the jobs of a study give the same keys
+@lru_cache(4096)  # the jobs of a study give the same keys
 def _with_parts(keys: frozenset[str]) -> frozenset[str]:
     above = {key.rpartition(".")[0] for key in keys} & parts_by_key().keys()
     return keys | above | {part for key in keys for part in stands_for(key)}

@@ -315,6 +315,7 @@ def _check_cases(
             parts = [check(range(half), lambda done, *_: progress(2 * done, total, "")), others()]
         progress(total, total, "")
     keys, rows, selected, found = zip(*parts, strict=True)
+    # in the order of jobs, and where a value is wrong in both halves, as in the first
     chain, wrong = itertools.chain.from_iterable, found[0] | found[-1] | found[0]
     problems = [*itertools.islice(wrong.values(), MAX_CONFLICTS)]
     if len(wrong) > MAX_CONFLICTS:
@@ -344,7 +345,8 @@ def _check_some(
         try:
             case = block.case(place)
         except CaseError as error:
-            wrong |= block.locate(error, block.rows_of(place)) | wrong
+            for where, problem in block.locate(error, block.rows_of(place)).items():
+                wrong.setdefault(where, problem)
             continue
         keys.append(case.key)
         rows.append(tuple(value_of(case, key) for key in columns))
