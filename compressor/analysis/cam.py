@@ -45,9 +45,10 @@ class Cam:
         return self.displace(angles, self.gas_corners, self.ideal(self.gas_corners[0]))
 
     def displace(self, angles, corners, place):
-        """Return a displacement (m) that begins at the first corner, with the piston at a place.
+        """Return a displacement (m) over angles (rad), by three corners (rad).
 
-        It dwells at the height reached between the other two, and falls to that of the piston.
+        It rises from the first as the piston leaves a place (m), dwells between the others, then
+        falls as the piston does.
         """
         p, turned, (rise, bottom, fall) = self.p, np.mod(angles, 2 * math.pi), corners
         x = self.ideal(turned)

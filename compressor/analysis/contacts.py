@@ -123,9 +123,9 @@ def impacts_of(run: "xr.Dataset", series: ContactSeries) -> list[Impact]:
         if first == series.time.size:  # no contact follows
             continue
         last = begin + int(np.flatnonzero(series.depth[begin:first] < 0)[-1])  # off its bore
-        near = slice(max(0, last - 1), last + 2)
-        rates = np.diff(series.depth[near]) / np.diff(series.time[near])
-        time = float(np.interp(0.0, series.depth[near][-2:], series.time[near][-2:]))
+        depth, times = (one[max(0, last - 1) : last + 2] for one in (series.depth, series.time))
+        rates = np.diff(depth) / np.diff(times)
+        time = float(np.interp(0.0, depth[-2:], times[-2:]))
         speed = max(0.0, float(rates.max()))
         longest = contact.impact_time(contact.impact_depth(mass, speed), speed)
         turns = np.interp(time, series.time, series.angle) / (2 * np.pi)

@@ -201,7 +201,10 @@ def drawn_study(
 
 
 def describe_run(name: str, anchor: str, data: xr.Dataset) -> SimpleNamespace:
-    """Return what was run, under which name, and how it ended; anchor: of its section."""
+    """Return what was run, under which name, and how it ended; anchor: of its section.
+
+    `problem`: a job has failed; `has_result`: one is ok.
+    """
     counts, found = study_section.count_jobs(data)
     return SimpleNamespace(name=name, anchor=anchor, counts=counts, problem=found["failed"] > 0,
                            has_result=found["ok"] > 0)  # fmt: skip

@@ -209,14 +209,15 @@ def records(
             left["missing"] += 1
             continue
         try:
-            outcome, case = stored.outcome(position), stored.case_at(position)
-            record = store.job_record(stored, key)
+            outcome = stored.outcome(position)
+            if outcome.reason:
+                left[outcome.reason] += 1
+                continue
+            case, record = stored.case_at(position), store.job_record(stored, key)
         except store.DamagedFile:
             case = None
         if case is None:
             left["damaged"] += 1
-        elif outcome.reason:
-            left[outcome.reason] += 1
         elif record is None:
             left["without_record"] += 1
         else:

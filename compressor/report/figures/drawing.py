@@ -38,7 +38,7 @@ class Panel:
     """One of a figure's axes, to fill and to read; suffix: of its axes in plotly, such as "2".
 
     What is drawn is in the units that `label` is given, and becomes multiples of those in which the
-    axes are read. `traces`, and plotly's annotations `notes` and shapes `rules`, but for `title`.
+    axes are read. `traces`: as they were drawn; `notes`, `rules`: plotly's annotations and shapes.
     """
 
     def __init__(self, figure: go.Figure, suffix: str, units: Units = "usual"):

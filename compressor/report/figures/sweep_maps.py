@@ -24,9 +24,10 @@ MAX_CELLS = 64  # along an axis
 
 
 def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> go.Figure:
-    """Return a map of every measure over both axes of a grid, a cell a job; noise is no pattern.
+    """Return a map of every measure over both axes of a grid, a cell a job.
 
-    At most MAX_CELLS along an axis; the axis of fewer values lies along y.
+    Colours span the error bars at least, so that noise is no pattern. At most MAX_CELLS lie along
+    an axis; the axis of fewer values lies along y.
     """
     x, y = sorted(sweep.axes, key=lambda axis: -axis.values.size)
     table = PlottedSweep(sweep.data.transpose(y.name, x.name, ...), (x, y))
