@@ -27,8 +27,7 @@ def bounce(time):
     away = SPEED * flown * (1.0 - flown / FLIGHT)
     touching = since < CONTACT
     depth = np.where(touching, DEPTH * np.sin(phase), -away)
-    force = PEAK * np.sin(phase) + DAMPED * np.sin(2.0 * phase)
-    return depth, np.where(touching, force, 0.0)
+    return depth, np.where(touching, (PEAK * np.sin(phase) + DAMPED * np.sin(2.0 * phase)), 0.0)
 
 
 def pressed(time):

@@ -355,5 +355,4 @@ def frame_orders():
     orders = np.array([1.0, 2.0]) / case.turn
     pairs, own = orders[:, None], natural / (2.0 * math.pi)
     stiffness = own**2 - pairs**2 + 2j * body.damping_ratio * own * pairs
-    back = sum(masses[2:]) / body.mass_kg * pairs**2 / stiffness
-    return lines[0] / (1.0 - back), lines[1]
+    return lines[0] / (1.0 - (sum(masses[2:]) / body.mass_kg * pairs**2 / stiffness)), lines[1]

@@ -117,8 +117,7 @@ def test_a_unit_is_told_of_once_and_in_place_of_what_follows_from_it(read):
         "N/mm^1.5; 336 N/mm^1.5 is outside the range that the program was judged on, 3162.28 to "
         "3.16228e+07 N/mm^1.5"
     )
-    stiffness = "contact.stiffness_N_per_mm15"
-    assert cautions(read(text)) == [Caution(stiffness, told, 2, 2)]
+    assert cautions(read(text)) == [Caution("contact.stiffness_N_per_mm15", told, 2, 2)]
 
 
 def test_a_large_sweep_is_sampled_evenly_and_always_the_same(read, monkeypatch):

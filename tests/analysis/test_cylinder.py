@@ -123,8 +123,7 @@ def test_the_pressures_of_a_run_are_those_that_press(tmp_path, name):
     exact = 1e-9 if name != "card" else 2e-5  # of a card straight lines between nodes
     most = np.abs(run.piston_force.values).max()
     assert force == pytest.approx(run.piston_force.values, abs=exact * most)
-    works = sum(one.work for one in found.values())
-    assert works == pytest.approx(-float(run.load_work), rel=5e-3)
+    assert sum(one.work for one in found.values()) == pytest.approx(-float(run.load_work), rel=5e-3)
 
 
 def test_another_program_s_double_acting_machine():

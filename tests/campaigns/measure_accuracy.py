@@ -49,8 +49,7 @@ def apart(one, exact):
 def timed(values, **solve):
     """A run, and the processor time (s) that it took."""
     began = time.process_time()
-    found = simulate(Case.from_values({**values, "solve": solve}))
-    return found, time.process_time() - began
+    return simulate(Case.from_values({**values, "solve": solve})), time.process_time() - began
 
 
 def cost(values, word):

@@ -287,8 +287,7 @@ def test_a_key_changes_what_is_stored_and_the_job_that_the_table_says(key):
 
 def each(pairs):
     """Try a test with each pair of a key and a machine, named by the key."""
-    names = [key for key, _ in pairs]
-    return pytest.mark.parametrize(("key", "where"), pairs, ids=names)
+    return pytest.mark.parametrize(("key", "where"), pairs, ids=[key for key, _ in pairs])
 
 
 @each([one for one in UNREAD if one not in UNREAD_FACTS])

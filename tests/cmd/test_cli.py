@@ -48,8 +48,7 @@ def test_a_run_says_what_it_did_and_what_comes_next(case_file, compsim):
     assert "3 jobs run in" in err
     assert err.endswith("next: compsim report -r 'out dir'\n")
     assert "\r" not in err
-    manifest = read_studies("out dir")[0]
-    assert manifest.command == "compsim run two.yaml one.yaml -j 1 -r 'out dir'"
+    assert read_studies("out dir")[0].command == "compsim run two.yaml one.yaml -j 1 -r 'out dir'"
     stamps = {path: path.stat().st_mtime_ns for path in Path("out dir").glob("*/*")}
     again = compsim("run", "two.yaml", "one.yaml", "-r", "out dir")
     assert again.out == out
@@ -79,8 +78,7 @@ def test_only_selected_jobs_run_and_the_study_stays_whole(case_file, compsim):
     out, err = compsim("run", "two.yaml", "one.yaml", "-j", "1", *only)
     assert [line.split()[1:6:2] for line in out.splitlines()] == [["1", "1", "0"], ["0", "0", "0"]]
     assert err.startswith("--only selects 1 of 3 jobs\n")
-    found = store.open_study("results", "two")
-    assert found.status.values.tolist() == ["ok", "missing"]
+    assert store.open_study("results", "two").status.values.tolist() == ["ok", "missing"]
     assert "2 jobs run in" in compsim("run", "two.yaml", "one.yaml", "-j", "1").err
     assert store.open_study("results").status.values.tolist() == ["ok"] * 3
 

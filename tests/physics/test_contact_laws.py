@@ -53,8 +53,7 @@ def contact(law, exponent=1.5, **more):
 @pytest.mark.parametrize(("key", "names"), [("contact.law", Law), ("load", Load)])
 def test_every_choice_of_a_case_file_is_compiled(key, names):
     by_keys = {"cylinder", "card"}  # of load: gas
-    words = {name.lower() for name in names.__members__} - by_keys
-    assert words == set(table()[key].choices)
+    assert ({name.lower() for name in names.__members__} - by_keys) == set(table()[key].choices)
 
 
 @laws

@@ -218,8 +218,7 @@ def test_a_clearance_that_vanishes_leaves_the_ideal_machine(values):
         found = integrate(request({**values, "clearance_mm": size, "contact": contact}, 2e-5, 0.1))
         assert found.reason == ""
         moved.append(np.abs(found.states[:, 0]).max())
-    slopes = np.diff(np.log(moved)) / np.diff(np.log(sizes))
-    assert slopes == pytest.approx(1.0, abs=0.1)
+    assert (np.diff(np.log(moved)) / np.diff(np.log(sizes))) == pytest.approx(1.0, abs=0.1)
 
 
 # ---- tolerance
@@ -244,6 +243,5 @@ def test_errors_are_proportional_to_the_tolerance(joint, more):
     errors = []
     for asked.rtol in LADDER:
         errors.append(apart(accelerations(asked.p, integrate(asked)), exact))
-    slope = np.polyfit(np.log(LADDER), np.log(errors), 1)[0]
-    assert slope == pytest.approx(1, abs=0.25)
+    assert np.polyfit(np.log(LADDER), np.log(errors), 1)[0] == pytest.approx(1, abs=0.25)
     assert all(later < 2.0 * before for before, later in itertools.pairwise(errors))

@@ -173,8 +173,7 @@ def test_the_speed_of_approach_is_that_where_the_gap_closes(late):
     assert np.sign(seen[0]) == np.sign(late)
     # beyond it the contact has begun to push
     assert seen[1] == pytest.approx(closed[1], abs=1e-6 if late < 0.0 else 5e-5)
-    plain = contact_at(SMALL_END, 0.0, y + late * middle, 0, p).rate
-    assert abs(plain - closed[1]) > 1e-4
+    assert abs(contact_at(SMALL_END, 0.0, y + late * middle, 0, p).rate - closed[1]) > 1e-4
 
 
 # ---- constructed re-engagements: a free flight drawn backwards from its contact

@@ -126,8 +126,7 @@ def linear_step(eigenvalue):
 @pytest.mark.parametrize("eigenvalue", [-3e3, 40.0])
 def test_an_explicit_step_tells_the_eigenvalue(eigenvalue):
     work, z = linear_step(eigenvalue)
-    found = stiff_rate(stepper(), H, z, work, SIZE)
-    assert found == pytest.approx(abs(eigenvalue), rel=1e-9)
+    assert stiff_rate(stepper(), H, z, work, SIZE) == pytest.approx(abs(eigenvalue), rel=1e-9)
 
 
 def stiff_work(eigenvalues):
@@ -157,7 +156,6 @@ def explicit_steps(w, reach, limit=1000):
 
 def test_stability_that_holds_the_steps_calls_the_stiff_partner():
     looks = math.ceil(STEPS_BEFORE_STIFF / TEST_INTERVAL)
-    steps = explicit_steps(stepper(), 1.05 * LIMITED_REACH)
-    assert steps == looks * TEST_INTERVAL
+    assert explicit_steps(stepper(), 1.05 * LIMITED_REACH) == looks * TEST_INTERVAL
     assert explicit_steps(stepper(), 0.95 * LIMITED_REACH) == 1000
     assert explicit_steps(stepper(Mode.EXPLICIT), 1.05 * LIMITED_REACH) == 1000

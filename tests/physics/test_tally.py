@@ -122,8 +122,7 @@ def test_the_nodes_of_a_step_have_what_is_tallied_and_no_more(features):
     start(np.zeros((2, 2)), y, p)
     for row in rows:
         observe_contact(ideal(0.01, p), y, 0, p, row)
-    written = {*np.flatnonzero(np.isfinite(rows[0])).tolist()}
-    assert written == {*IN_STEPS}
+    assert {*np.flatnonzero(np.isfinite(rows[0])).tolist()} == {*IN_STEPS}
     tally = new_tally(True)
     tally_step(1e-4, *nodes, rows, 1, APART, SIDES, True, tally, p)
     for field in FIELDS:

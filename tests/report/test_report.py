@@ -148,8 +148,7 @@ def replace_jobs(folder, *jobs, without=()):
 def test_every_figure_is_drawn_and_shown(full):
     figures = FIGURES["paper"]
     names = {f"{name}.{kind}" for name in figures for kind in ("png", "csv", "js")}
-    beside = {"index.html", "plotly.min.js"}
-    assert {path.name for path in full.iterdir()} == names | beside
+    assert {path.name for path in full.iterdir()} == names | {"index.html", "plotly.min.js"}
     found = read(full)
     assert [name for name in found.ids if name in figures] == [*figures]
     assert len(found.sources) == len(figures)

@@ -144,8 +144,7 @@ def test_the_clock_is_looked_at_however_hard_the_case(extreme, method, monkeypat
     found = measure(Case.from_values({**values, **EXTREMES[extreme], "solve": solve}))
     assert found.detail == f"more than {LOOKS - 0.5} s of wall time in all"
     between = CHUNK if method in COMPILED else 256
-    done = found.numbers["steps"] + found.numbers["rejected"]
-    assert 0 < done <= LOOKS * between
+    assert 0 < (found.numbers["steps"] + found.numbers["rejected"]) <= LOOKS * between
     assert found.numbers["evaluations"] <= LOOKS * between * (26 if method in COMPILED else 1)
 
 

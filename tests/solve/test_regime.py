@@ -126,8 +126,7 @@ def test_the_paper_s_cases_are_periodic_and_not_searched(joint, monkeypatch):
 
 
 def test_a_run_without_errors_has_no_regime_unless_its_horizon_is_asked_for():
-    plain = measure(case(CHAOTIC, error_bars=False, duration_rev=2))
-    assert plain.attributes["regime"] == ""
+    assert measure(case(CHAOTIC, error_bars=False, duration_rev=2)).attributes["regime"] == ""
     asked = measure(case(CHAOTIC, error_bars=False, horizon=True, duration_rev=2))
     assert asked.attributes["regime"] == "chaotic"
     assert math.isnan(asked.numbers["revolutions"])
@@ -215,8 +214,7 @@ def test_a_period_is_found_in_revolutions_from_where_a_motion_has_settled(shape,
 @pytest.mark.parametrize(("duration", "settle"), [(0.5, 0), (1.5, 1), (2.9, 1)])
 def test_less_than_two_revolutions_tell_no_period(duration, settle):
     of = case(duration_rev=duration, settle_rev=settle)
-    rows = samples(of, np.ones_like)
-    assert repeats(of, rows, NO_ERRORS)[0] is None
+    assert repeats(of, samples(of, np.ones_like), NO_ERRORS)[0] is None
     whole = replace(of, solve=replace(of.solve, duration_rev=settle + 2.0))
     assert compared_per_rev(whole)
     assert repeats(whole, samples(whole, np.ones_like), NO_ERRORS) == (1, settle)

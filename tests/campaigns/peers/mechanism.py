@@ -67,8 +67,7 @@ def error(found, truth):
 
 def loosest(errors, limit):
     """The loosest tolerance of {rtol: error} whose error is at most `limit`, or None."""
-    enough = [rtol for rtol, found in errors.items() if found <= limit]
-    return max(enough, default=None)
+    return max([rtol for rtol, found in errors.items() if found <= limit], default=None)
 
 
 PARAMS = params("both")
