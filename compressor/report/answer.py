@@ -288,11 +288,11 @@ def finding(
         number = format_measure(measure, float(values[n]), float(bars[n]))
         return f"{number} {measure.unit}".rstrip()
 
-    def unchanged(value: str, words: str = "") -> MetricChange | None:
+    def tell_unchanged(value: str, words: str = "") -> MetricChange | None:
         return MetricChange(title, "", "", value, "", words, 0.0, always) if always else None
 
     if not sure:
-        return None if np.isnan(values).all() else unchanged(UNKNOWN, "within its error bar")
+        return None if np.isnan(values).all() else tell_unchanged(UNKNOWN, "within its error bar")
     low, high = (pick(sure, key=lambda n: values[n]) for pick in (min, max))
     if len(values) == 1:
         return MetricChange(title, "", "", text(high), "", "", 0.0, always)
@@ -300,11 +300,11 @@ def finding(
     if not differ_beyond_bars(values[sure], bars[sure]):
         some = f"known of {len(sure)} of {len(values)} jobs" * (len(sure) < len(values))
         same = f"the same{' in all jobs' * (not some)} within its error bars" * (len(sure) > 1)
-        return unchanged(text(high), ", ".join(filter(None, (some, same))))
+        return tell_unchanged(text(high), ", ".join(filter(None, (some, same))))
     ratio = most / least if least * most > 0.0 else math.inf
     if max(ratio, 1.0 / ratio) < MIN_RATIO:
         span = f"{number(least)} to {number(most)} {measure.unit}".rstrip()
-        return unchanged(span, "nearly the same in all jobs")
+        return tell_unchanged(span, "nearly the same in all jobs")
     rank = min(abs(math.log(ratio)), FROM_ZERO)
     change = f"{ratio:.3g} times" if ratio < 1e3 else "from nearly nothing"
     change = change if least >= 0.0 else ""

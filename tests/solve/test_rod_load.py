@@ -95,21 +95,21 @@ def test_bars_hold_the_error(joint, load):
 @pytest.mark.parametrize("method", ["RODAS", "DOP853"])
 def test_other_methods_find_the_same_sides(method):
     """And by how much a state that is off moves the changes of contact, on which bars rest."""
-    ours, theirs = (
-        solve(Case.from_values(
-            FLIES | {"solve": {"duration_rev": 1.5, "settle_rev": 0.5, "output_step_deg": 0.9,
-                               "rtol": 1e-5, "error_bars": False, "method": one}}
-        )) for one in ("auto", method)
-    )  # fmt: skip
+    brief = TURN | {"duration_rev": 1.5, "settle_rev": 0.5, "rtol": 1e-5, "error_bars": False}
+    rods = [FLIES["machine"] | {"rod_mass_kg": 4.7 + 1e-12 * n} for n in range(5)]
+    cases = ([FLIES | {"machine": rod, "solve": brief | {"method": one}} for rod in rods]
+             for one in ("auto", method))  # fmt: skip
+    runs = [[solve(Case.from_values(values)) for values in some] for some in cases]
+    ours, theirs = (some[0] for some in runs)
     for name in (*NAMES, "contact_loss_fraction"):
         one, other = (np.ravel(found.metrics[name])[-1] for found in (ours, theirs))
         assert one == pytest.approx(other, rel=2e-3), name
     one, other = (found.trajectory.tally for found in (ours, theirs))
     for name in ("side_seconds", "side_peak"):
         assert one[name] == pytest.approx(other[name], rel=2e-3), name
-    # the last bit of a mass moves it up to three times
-    (none, shift), (no, other_shift) = one["switch_shift"], other["switch_shift"]
-    assert none == no == 0.0 < 0.1 < shift / other_shift < 10.0
+    shifts = [[found.trajectory.tally["switch_shift"] for found in some] for some in runs]
+    one, other = np.median(shifts, axis=1)  # the last bit of a mass moves one up to three times
+    assert one == pytest.approx(other, rel=0.6)
 
 
 def test_no_sample_lies_above_a_peak(tmp_path):
